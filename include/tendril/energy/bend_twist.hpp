@@ -1,0 +1,262 @@
+#pragma once
+/// \file bend_twist.hpp
+/// Bending and twisting energy of one cell: the two edge frames that meet at a vertex, or an edge and the fixed frame of a clamp
+/// (the half cell). Discrete curvature binormal after Bergou et al., "Discrete Elastic Rods" (2008), section 4.2; second derivatives
+/// built from those of Bergou et al., "Discrete Viscous Threads" (2010), appendix, for the normalised mean director. docs/theory.md derives them.
+
+#include "tendril/geometry/frame.hpp"
+
+#include <array>
+
+namespace tendril {
+
+/// How an angle between neighbouring edges becomes a strain: `tan` is 2 tan(angle/2), a barrier at 180 degrees; `angle` is the angle itself.
+enum class Measure { tan, angle };
+
+/// Unknowns of a cell in the order x_{i-1}, theta_{i-1}, x_i, theta_i, x_{i+1}.
+inline constexpr int cell_size = 11;
+/// Entries of the upper triangle of a cell's Hessian, row by row.
+inline constexpr int cell_pairs = cell_size * (cell_size + 1) / 2;
+
+/// Constants of one cell; `free[k]` is 1 where frame k belongs to an edge that moves and 0 for the frame of a clamp.
+template <class T> struct CellOf {
+  std::array<T, 3> stiffness; ///< (kb1, kb2, kt) / Lbar [N m]
+  std::array<T, 3> rest;      ///< strains at which the energy vanishes, integrated over the cell [rad]
+  std::array<T, 2> weight;    ///< lbar / Lbar = weight0 l0 + weight1 l1 [1/m]
+  std::array<T, 2> free;
+  T turns; ///< 2 pi x whole turns in the twist angle (`angle` measure; 0 for `tan`) [rad]
+  T sign;  ///< -1 when the number of whole turns is odd, else 1
+};
+
+template <class T> struct CellDerivatives {
+  std::array<T, cell_size> gradient;
+  std::array<T, cell_pairs> hessian; ///< upper triangle, row by row
+};
+
+/// phi(z) = atan(sqrt z)/sqrt z and two derivatives, z = tan^2 of half the turning angle: the factor between the two measures of bending.
+template <class T> struct AngleFactor {
+  T value, first, second;
+};
+template <class T> AngleFactor<T> angleFactor(const T &z) {
+  using std::atan, std::sqrt;
+  // Series below z = 0.02, closed form above: both are good to 1e-13 at the seam.
+  const auto small = z < T(0.02);
+  const T safe = select(small, T(1.0), z);
+  const T root = sqrt(safe), value = atan(root) / root;
+  const T inverse = T(1.0) / (T(1.0) + safe);
+  const T first = (inverse - value) / (T(2.0) * safe);
+  const T second = (-inverse * inverse - T(3.0) * first) / (T(2.0) * safe);
+  T v(0.0), d(0.0), dd(0.0);
+  for (int k = 9; k >= 0; --k) {
+    const double c = (k % 2 == 0 ? 1.0 : -1.0) / (2 * k + 1);
+    v = v * z + T(c);
+    if (k >= 1) d = d * z + T(k * c);
+    if (k >= 2) dd = dd * z + T(k * (k - 1) * c);
+  }
+  return {select(small, v, value), select(small, d, first), select(small, dd, second)};
+}
+
+/// Geometry shared by the strain and its derivatives.
+template <class T> struct CellGeometry {
+  T chi;              ///< 1 + t0.t1
+  Vector3<T> binormal; ///< curvature binormal 2 t0 x t1 / chi
+  HalfAngle<T> half;  ///< of the twist angle, whole turns included in the signs
+  Vector3<T> d1, d2;  ///< mean directors, carried back to the first tangent
+  T kappa1, kappa2;   ///< binormal . d1, binormal . d2
+  T stretch;          ///< lbar / Lbar
+};
+
+template <class T> CellGeometry<T> cellGeometry(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell) {
+  CellGeometry<T> g;
+  g.chi = T(1.0) + f0.tangent.dot(f1.tangent);
+  g.binormal = f0.tangent.cross(f1.tangent) * (T(2.0) / g.chi);
+  g.half = halfAngleBetween(f0, f1);
+  g.half.cosine = g.half.cosine * cell.sign; // a whole turn flips the sign of the half angle
+  g.half.sine = g.half.sine * cell.sign;
+  const Vector3<T> second = f0.secondDirector();
+  g.d1 = f0.director * g.half.cosine + second * g.half.sine;
+  g.d2 = second * g.half.cosine - f0.director * g.half.sine;
+  g.kappa1 = g.binormal.dot(g.d1);
+  g.kappa2 = g.binormal.dot(g.d2);
+  g.stretch = cell.weight[0] * f0.length + cell.weight[1] * f1.length;
+  return g;
+}
+
+/// Twist strain and its two derivatives with respect to the twist angle.
+template <Measure measure, class T> std::array<T, 3> twistMeasure(const HalfAngle<T> &half, const CellOf<T> &cell) {
+  if constexpr (measure == Measure::tan) {
+    const T tangent = half.sine / half.cosine, slope = T(1.0) + tangent * tangent;
+    return {T(2.0) * tangent, slope, slope * tangent};
+  } else {
+    const HalfAngle<T> principal{half.cosine * cell.sign, half.sine * cell.sign};
+    return {principal.angle() + cell.turns, T(1.0), T(0.0)};
+  }
+}
+
+/// Strains of a cell integrated over it (bending about d1 and d2, twist) [rad], before the rest strains are taken off.
+/// Seed formulas: kappa_alpha Lbar = (lbar/Lbar) kbar.e_alpha, tau Lbar = 2 tan(angle/2).
+template <Measure measure, class T> std::array<T, 3> cellStrain(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell) {
+  const CellGeometry<T> g = cellGeometry(f0, f1, cell);
+  T factor = g.stretch;
+  if constexpr (measure == Measure::angle)
+    factor = factor * angleFactor<T>((g.kappa1 * g.kappa1 + g.kappa2 * g.kappa2) * T(0.25)).value;
+  return {factor * g.kappa1, factor * g.kappa2, twistMeasure<measure>(g.half, cell)[0]};
+}
+
+/// Energy of a cell [J]: 1/2 sum_k stiffness_k (strain_k - rest_k)^2. Not finite where the two edges are opposite.
+template <Measure measure, class T> T cellEnergy(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell) {
+  const std::array<T, 3> strain = cellStrain<measure>(f0, f1, cell);
+  T energy(0.0);
+  for (int k = 0; k < 3; ++k) {
+    const T s = strain[k] - cell.rest[k];
+    energy = energy + T(0.5) * cell.stiffness[k] * s * s;
+  }
+  return energy;
+}
+
+template <class T> Matrix3<T> crossMatrix(const Vector3<T> &v) {
+  Matrix3<T> m;
+  m << T(0.0), -v[2], v[1], v[2], T(0.0), -v[0], -v[1], v[0], T(0.0);
+  return m;
+}
+
+/// Gradient and Hessian of a cell's energy, pulled back by the retraction at the current frames: exact and symmetric.
+template <Measure measure, class T>
+void cellDerivatives(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell, CellDerivatives<T> &out) {
+  const CellGeometry<T> g = cellGeometry(f0, f1, cell);
+  const Vector3<T> &t0 = f0.tangent, &t1 = f1.tangent, &b = g.binormal;
+  const T i0 = cell.free[0] / f0.length, i1 = cell.free[1] / f1.length;
+  const T two_over_chi = T(2.0) / g.chi;
+  const Vector3<T> mean = (t0 + t1) / g.chi;
+
+  // The energy as a function f of y = (kappa1, kappa2, stretch) and of the twist angle.
+  AngleFactor<T> a{T(1.0), T(0.0), T(0.0)};
+  if constexpr (measure == Measure::angle) a = angleFactor<T>((g.kappa1 * g.kappa1 + g.kappa2 * g.kappa2) * T(0.25));
+  const T kappa[2] = {g.kappa1, g.kappa2};
+  T slope[2][2]; // d strain_i / d kappa_j, per unit stretch
+  T force[2];
+  for (int i = 0; i < 2; ++i) {
+    force[i] = cell.stiffness[i] * (g.stretch * a.value * kappa[i] - cell.rest[i]);
+    for (int j = 0; j < 2; ++j) slope[i][j] = T(0.5) * a.first * kappa[i] * kappa[j] + (i == j ? a.value : T(0.0));
+  }
+  T f1st[2], f2nd[2][2], fmix[2];
+  const T along = force[0] * kappa[0] + force[1] * kappa[1];
+  for (int j = 0; j < 2; ++j) {
+    f1st[j] = g.stretch * (force[0] * slope[0][j] + force[1] * slope[1][j]);
+    fmix[j] = force[0] * slope[0][j] + force[1] * slope[1][j];
+    for (int i = 0; i < 2; ++i) fmix[j] = fmix[j] + cell.stiffness[i] * g.stretch * slope[i][j] * a.value * kappa[i];
+    for (int k = 0; k < 2; ++k) {
+      T v(0.0);
+      for (int i = 0; i < 2; ++i) v = v + cell.stiffness[i] * slope[i][j] * slope[i][k];
+      f2nd[j][k] = g.stretch * g.stretch * v;
+    }
+  }
+  if constexpr (measure == Measure::angle)
+    for (int j = 0; j < 2; ++j)
+      for (int k = 0; k < 2; ++k) {
+        T v = T(0.5) * a.first * (force[j] * kappa[k] + force[k] * kappa[j]) + T(0.25) * a.second * along * kappa[j] * kappa[k];
+        if (j == k) v = v + T(0.5) * a.first * along;
+        f2nd[j][k] = f2nd[j][k] + g.stretch * v;
+      }
+  const T f_stretch = a.value * along;
+  const T f_stretch2 = a.value * a.value * (cell.stiffness[0] * kappa[0] * kappa[0] + cell.stiffness[1] * kappa[1] * kappa[1]);
+  const std::array<T, 3> twist = twistMeasure<measure>(g.half, cell);
+  const T twist_force = cell.stiffness[2] * (twist[0] - cell.rest[2]);
+  const T f_twist = twist_force * twist[1];
+  const T f_twist2 = cell.stiffness[2] * twist[1] * twist[1] + twist_force * twist[2];
+
+  // Gradients of the pieces over (e0, theta0, e1, theta1).
+  using Vector8 = Eigen::Matrix<T, 8, 1>;
+  Vector8 twist_g, psi_g, stretch_g, kappa_g[2];
+  twist_g << b * (T(0.5) * i0), -cell.free[0], b * (T(0.5) * i1), cell.free[1];
+  psi_g = twist_g * T(0.5);
+  psi_g[3] = psi_g[3] + cell.free[0];
+  stretch_g << t0 * (cell.weight[0] * cell.free[0]), T(0.0), t1 * (cell.weight[1] * cell.free[1]), T(0.0);
+  // Gradient of binormal.p for a vector p that moves with the first frame.
+  auto directorGradient = [&](const Vector3<T> &p, const T &kp) {
+    Vector8 v;
+    v << (t1.cross(p) * two_over_chi - mean * kp) * i0, T(0.0), (t0.cross(p) * two_over_chi + mean * kp) * (-i1), T(0.0);
+    return v;
+  };
+  kappa_g[0] = directorGradient(g.d1, g.kappa1) + psi_g * g.kappa2;
+  kappa_g[1] = directorGradient(g.d2, g.kappa2) - psi_g * g.kappa1;
+
+  const Vector8 gradient = kappa_g[0] * f1st[0] + kappa_g[1] * f1st[1] + twist_g * f_twist + stretch_g * f_stretch;
+
+  // Curvature of the pieces: binormal.p with p = f1 d1 + f2 d2 frozen on the first frame, its turning with psi, twist and stretch.
+  const Vector3<T> p = g.d1 * f1st[0] + g.d2 * f1st[1];
+  const Vector3<T> dp = g.d2 * f1st[0] - g.d1 * f1st[1];
+  const T bp = b.dot(p), bdp = b.dot(dp);
+  const Vector8 dp_g = directorGradient(dp, bdp);
+  const T twist_weight = f_twist + T(0.5) * bdp;
+
+  const Vector8 u0 = kappa_g[0] * f2nd[0][0] + kappa_g[1] * f2nd[0][1] + stretch_g * fmix[0];
+  const Vector8 u1 = kappa_g[0] * f2nd[0][1] + kappa_g[1] * f2nd[1][1] + stretch_g * fmix[1];
+  const Vector8 us = kappa_g[0] * fmix[0] + kappa_g[1] * fmix[1] + stretch_g * f_stretch2;
+  const Vector8 up = dp_g - psi_g * bp;
+  const Vector8 ut = twist_g * f_twist2;
+  T h[8][8]; // upper triangle
+  for (int r = 0; r < 8; ++r)
+    for (int c = r; c < 8; ++c)
+      h[r][c] = kappa_g[0][r] * u0[c] + kappa_g[1][r] * u1[c] + stretch_g[r] * us[c] + twist_g[r] * ut[c] + psi_g[r] * up[c] + dp_g[r] * psi_g[c];
+
+  const Vector3<T> m2 = p * two_over_chi, m0 = t0.cross(m2), m1 = t1.cross(m2);
+  const Vector3<T> two_mean = mean * (T(2.0) * bp);
+  const Vector3<T> w0 = (two_mean - m1) * (i0 * i0), w1 = (two_mean + m0) * (i1 * i1);
+  const T shift = bp / g.chi;
+  const T s0 = f_stretch * cell.weight[0] * i0 - shift * i0 * i0, s1 = f_stretch * cell.weight[1] * i1 - shift * i1 * i1;
+  const Vector3<T> q0 = p * (T(0.5) * i0 * i0) - (t0 + mean) * (T(0.25) * i0 * i0 * twist_weight);
+  const Vector3<T> q1 = (t1 + mean) * (T(-0.25) * i1 * i1 * twist_weight);
+  const Vector3<T> v0 = m1 * (i0 * i0), v1 = m0 * (i1 * i1);
+  for (int r = 0; r < 3; ++r)
+    for (int c = r; c < 3; ++c) {
+      // 2 bp mean mean' - m1 mean' - mean m1', and the like for the second edge; symmetric sums.
+      h[r][c] = h[r][c] + w0[r] * mean[c] - mean[r] * v0[c] - t0[r] * t0[c] * s0 + b[r] * q0[c] + q0[r] * b[c];
+      h[4 + r][4 + c] = h[4 + r][4 + c] + w1[r] * mean[c] + mean[r] * v1[c] - t1[r] * t1[c] * s1 + b[r] * q1[c] + q1[r] * b[c];
+    }
+  for (int r = 0; r < 3; ++r) {
+    h[r][r] = h[r][r] + s0;
+    h[4 + r][4 + r] = h[4 + r][4 + r] + s1;
+  }
+  const T i01 = i0 * i1;
+  const Vector3<T> x0 = (two_mean - m1) * i01, x1 = m0 * i01;
+  const Vector3<T> cross = t0 * (twist_weight / g.chi) - m2;
+  const Matrix3<T> skew = crossMatrix<T>(cross);
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) {
+      T v = x0[r] * mean[c] + mean[r] * x1[c] - t0[r] * t1[c] * (shift * i01) + skew(r, c) * i01 - b[r] * mean[c] * (T(0.5) * twist_weight * i01);
+      if (r == c) v = v - shift * i01;
+      h[r][4 + c] = h[r][4 + c] + v;
+    }
+
+  // From edge vectors to vertices: e0 = x1 - x0, e1 = x2 - x1.
+  auto at = [&](int r, int c) { return r <= c ? h[r][c] : h[c][r]; };
+  auto put = [&](int r, int c, const T &v) { out.hessian[r * cell_size - r * (r - 1) / 2 + (c - r)] = v; };
+  for (int r = 0; r < 3; ++r) {
+    out.gradient[r] = -gradient[r];
+    out.gradient[4 + r] = gradient[r] - gradient[4 + r];
+    out.gradient[8 + r] = gradient[4 + r];
+    put(r, 3, -h[r][3]);
+    put(r, 7, -h[r][7]);
+    put(3, 4 + r, at(3, r) - at(3, 4 + r));
+    put(3, 8 + r, at(3, 4 + r));
+    put(4 + r, 7, at(r, 7) - at(4 + r, 7));
+    put(7, 8 + r, at(7, 4 + r));
+    for (int c = 0; c < 3; ++c) {
+      const T a00 = at(r, c), a01 = h[r][4 + c], a10 = h[c][4 + r], a11 = at(4 + r, 4 + c);
+      if (c >= r) put(r, c, a00);
+      put(r, 4 + c, a01 - a00);
+      put(r, 8 + c, -a01);
+      if (c >= r) put(4 + r, 4 + c, a00 - a01 - a10 + a11);
+      put(4 + r, 8 + c, a01 - a11);
+      if (c >= r) put(8 + r, 8 + c, a11);
+    }
+  }
+  out.gradient[3] = gradient[3];
+  out.gradient[7] = gradient[7];
+  put(3, 3, h[3][3]);
+  put(3, 7, h[3][7]);
+  put(7, 7, h[7][7]);
+}
+
+} // namespace tendril

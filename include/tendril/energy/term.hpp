@@ -1,0 +1,63 @@
+#pragma once
+/// \file term.hpp
+/// A term of the incremental potential: its value and its derivatives over the rows of one rod. To add an energy, write one file with a
+/// class derived from Term and add one line to makeTerms (terms.cpp).
+
+#include "tendril/dynamics/state.hpp"
+
+#include <memory>
+
+namespace tendril {
+
+/// One step to be taken: from the start state to `time`.
+struct Step {
+  double dt = 0;          ///< [s]; 0 in statics
+  double time = 0;        ///< at the end of the step: prescribed motions are at this time [s]
+  double load_factor = 1; ///< on gravity, forces, torques and moments
+  bool mixed = true;      ///< axial force as its own unknown, condensed edge by edge
+  bool isStatic() const { return dt == 0; }
+};
+
+/// Sums over rows; see DofMap. `equilibrium` is the gradient with the stretching force taken from the independent axial force.
+struct Rows {
+  std::vector<double> gradient, equilibrium, band;
+};
+
+class Term {
+public:
+  virtual ~Term() = default;
+  /// Called once before the iterations of a step.
+  virtual void beginStep(const State & /*start*/, const Configuration & /*start*/, const Step & /*step*/) {}
+  /// Called whenever the iterate has moved.
+  virtual void moveIterate(const Configuration & /*iterate*/) {}
+  /// [J], up to a constant of the step. Not finite where the configuration is impossible.
+  virtual double energy(const Configuration &configuration, int rod) const = 0;
+  /// Adds gradient and Hessian, pulled back by the retraction at the configuration.
+  virtual void addDerivatives(const Configuration &configuration, int rod, Rows &rows) const = 0;
+};
+
+/// Axial force of every edge as a linear law of its strain over one step: stiffness (strain - rest), dissipation included.
+struct AxialLaw {
+  std::vector<double> stiffness, rest;
+  void beginStep(const Scene &scene, const Elements &elements, const Configuration &start, const Step &step);
+};
+
+/// The terms that the scene needs, in a fixed order; stretch is the first.
+std::vector<std::unique_ptr<Term>> makeTerms(const Scene &scene, const Elements &elements, const AxialLaw &axial, bool dynamic);
+
+std::unique_ptr<Term> makeBendTwist(const Scene &, const Elements &);
+std::unique_ptr<Term> makeStretch(const Elements &, const AxialLaw &);
+std::unique_ptr<Term> makeInertia(const Scene &, const Elements &);
+std::unique_ptr<Term> makeLoad(const Scene &, const Elements &);
+
+/// Present strains of one cell, integrated over it [rad].
+std::array<double, 3> presentStrain(const Elements &elements, const Configuration &configuration, int rod, int cell);
+
+/// Stored and kinetic energies of a state [J].
+struct EnergyBudget {
+  double kinetic = 0, stretch = 0, bend = 0, twist = 0, gravity = 0;
+  double total() const { return kinetic + stretch + bend + twist + gravity; }
+};
+EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, double load_factor);
+
+} // namespace tendril

@@ -1,0 +1,75 @@
+#pragma once
+/// \file hdf5.hpp
+/// The little of HDF5 that tendril needs, with owned handles and errors as exceptions (which never leave io/).
+
+#include <hdf5.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace tendril {
+
+/// An HDF5 handle, closed by `close`.
+template <herr_t (*close)(hid_t)> class Hdf5Handle {
+public:
+  Hdf5Handle(hid_t id = -1) : id_(id) {}
+  Hdf5Handle(Hdf5Handle &&other) noexcept : id_(std::exchange(other.id_, -1)) {}
+  Hdf5Handle &operator=(Hdf5Handle &&other) noexcept {
+    std::swap(id_, other.id_);
+    return *this;
+  }
+  ~Hdf5Handle() {
+    if (id_ >= 0) close(id_);
+  }
+  operator hid_t() const { return id_; }
+
+private:
+  hid_t id_;
+};
+using Hdf5Group = Hdf5Handle<H5Gclose>;
+using Hdf5Dataset = Hdf5Handle<H5Dclose>;
+using Hdf5Space = Hdf5Handle<H5Sclose>;
+using Hdf5Properties = Hdf5Handle<H5Pclose>;
+using Hdf5Attribute = Hdf5Handle<H5Aclose>;
+using Hdf5Type = Hdf5Handle<H5Tclose>;
+
+class Hdf5File {
+public:
+  /// For reading. \throws SceneError
+  static Hdf5File open(const std::string &path);
+  /// A new file whose datasets only grow; every flush leaves it readable (HDF5's single writer, multiple readers). \throws SceneError
+  static Hdf5File create(const std::string &path);
+  /// No datasets may be created afterwards.
+  void startAppending();
+
+  bool has(const std::string &name) const;
+  /// Whole dataset as doubles, row-major; `columns` is its last dimension (1 for a list).
+  std::vector<double> read(const std::string &name, hsize_t columns) const;
+
+  void createGroup(const std::string &name);
+  void write(const std::string &name, const std::vector<hsize_t> &shape, const double *values);
+  void write(const std::string &name, const std::vector<hsize_t> &shape, const int *values);
+  void writeAttribute(const std::string &name, const std::string &value);
+  void writeAttribute(const std::string &name, const std::vector<double> &values);
+  void writeAttribute(const std::string &name, int value);
+  hid_t id() const { return file_; }
+
+private:
+  Hdf5Handle<H5Fclose> file_;
+  std::string path_;
+};
+
+/// A dataset that grows by one slab per append: shape (n, slab...).
+class Hdf5Series {
+public:
+  Hdf5Series(const Hdf5File &file, const std::string &name, const std::vector<hsize_t> &slab, bool integer = false);
+  void append(const double *values);
+  void flush() const { H5Dflush(dataset_); }
+
+private:
+  Hdf5Dataset dataset_;
+  std::vector<hsize_t> extent_;
+};
+
+} // namespace tendril

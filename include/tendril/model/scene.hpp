@@ -1,0 +1,114 @@
+#pragma once
+/// \file scene.hpp
+/// The scene: all that is fixed once set-up is done. Rods, what holds them, what pulls on them. Nothing here changes during a run.
+
+#include "tendril/energy/bend_twist.hpp"
+#include "tendril/model/material.hpp"
+
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace tendril {
+
+/// A mistake in the user's input. what() names the file and line (or the option), what was found and what to write.
+struct SceneError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Rod as drawn: the reference configuration. Vertex i and i+1 bound edge i; a closed rod has as many edges as vertices.
+struct Rod {
+  std::string name;
+  bool closed = false;
+  std::vector<Vec3> position; ///< reference positions (nv) [m]
+  std::vector<Vec3> director; ///< first directors (ne), unit, normal to their edges
+  Material material;
+  Measure measure = Measure::tan;
+  bool gravity = true;
+  /// Natural curvature about the two directors and twist (each [1/m]) where the rod is not stress-free as drawn.
+  enum class Natural { as_drawn, given } natural = Natural::as_drawn;
+  Vec3 natural_strain = Vec3::Zero(); ///< (curvature 1, curvature 2, twist) for Natural::given; zero is a straight rod
+  Vec3 initial_velocity = Vec3::Zero(); ///< [m/s]
+
+  double initial_turns = 0; ///< turns of twist put in at the start, spread by arc length; the natural shape does not have them
+
+  int vertices() const { return int(position.size()); }
+  int edges() const { return vertices() - (closed ? 0 : 1); }
+  int next(int vertex) const { return vertex + 1 == vertices() ? 0 : vertex + 1; }
+  Vec3 edge(int i) const { return position[next(i)] - position[i]; }
+  /// Edge on the far side of a vertex (towards lower numbers), or -1 at the first vertex of an open rod; and the other way.
+  int edgeBefore(int vertex) const { return vertex > 0 ? vertex - 1 : closed ? edges() - 1 : -1; }
+  int edgeAfter(int vertex) const { return vertex < edges() ? vertex : -1; }
+};
+
+/// How a held thing moves: displacement and rotation vector, both from the reference, piecewise linear in time and constant velocity after.
+struct Motion {
+  struct Key {
+    double time;       ///< [s]
+    Vec3 displacement; ///< [m]
+    Vec3 rotation;     ///< rotation vector about the vertex [rad]
+  };
+  Vec3 velocity = Vec3::Zero();         ///< [m/s]
+  Vec3 angular_velocity = Vec3::Zero(); ///< about the vertex [rad/s]
+  std::vector<Key> table;               ///< in order of time; used instead of the velocities when not empty
+
+  bool moves() const { return !table.empty() || !velocity.isZero(0) || !angular_velocity.isZero(0); }
+  Vec3 displacementAt(double time) const;
+  Mat3 rotationAt(double time) const;
+};
+
+/// What holds a vertex. `clamp` holds its position, tangent and director by half cells to a fixed frame; `pin` its position;
+/// `fix_twist` the twist of the rod there, by half cells, relative to the frame (a joint of constant velocity: the tangent is free).
+struct Support {
+  enum class Kind { clamp, pin, fix_twist } kind;
+  int rod, vertex;
+  Motion motion;
+  Frame frame; ///< reference frame at the vertex (clamp, fix_twist); length 1
+
+  bool holdsPosition() const { return kind != Kind::fix_twist; }
+  bool holdsTwist() const { return kind != Kind::pin; }
+};
+
+/// Dead loads; torques act about the present tangent of their edge, moments are fixed in space.
+struct NodalForce {
+  int rod, vertex;
+  Vec3 force; ///< [N]
+};
+struct EdgeMoment {
+  int rod, edge;
+  double torque; ///< about the tangent [N m]
+  Vec3 moment;   ///< [N m]
+};
+
+struct Scene {
+  std::vector<Rod> rods;
+  std::vector<Support> supports;
+  std::vector<NodalForce> forces;
+  std::vector<EdgeMoment> moments;
+  Vec3 gravity{0, -9.81, 0}; ///< [m/s^2]
+};
+
+/// Fills the directors of a rod with discrete Bishop frames: `start` (or some normal of the first edge when zero) transported along the
+/// polyline; on a closed rod the angle that remains after one round is spread over the edges by arc length.
+void setBishopDirectors(Rod &rod, const Vec3 &start = Vec3::Zero());
+
+/// Reference frame of edge i.
+Frame referenceFrame(const Rod &rod, int edge);
+
+/// Frame of the rod at a vertex: the mean of its two edges' frames; at an end, the tangent of the curve extrapolated by half an edge.
+Frame frameAtVertex(const Rod &rod, int vertex);
+
+/// Checks what the reader cannot see at one line: zero-length and folded edges, directors, indices. \throws SceneError naming the rod.
+void checkRod(const Rod &rod);
+
+/// Sizes of one rod that tell what to expect of it.
+struct DimensionlessGroups {
+  double length;               ///< [m]
+  double gravito_bending;      ///< rho_L g L^3 / EI
+  double axial_to_bending;     ///< EA L^2 / EI
+  double largest_turning;      ///< per vertex [deg]
+  double largest_twist;        ///< per vertex, of the reference directors [deg]
+};
+DimensionlessGroups dimensionlessGroups(const Rod &rod, const Vec3 &gravity);
+
+} // namespace tendril

@@ -1,0 +1,71 @@
+#include "tendril/dynamics/time_loop.hpp"
+
+#include <algorithm>
+#include <petsctime.h>
+#include <sstream>
+
+namespace tendril {
+
+PetscErrorCode TimeLoop::step(State &state, double dt, NewtonReport *report) {
+  PetscFunctionBeginUser;
+  Step step;
+  step.dt = settings_.dynamic ? dt : 0;
+  step.time = state.time + dt;
+  if (std::abs(step.time - settings_.t_end) < 1e-9 * settings_.dt) step.time = settings_.t_end; // no sliver of a step from rounding
+  step.load_factor = settings_.dynamic ? 1 : step.time;
+  step.mixed = settings_.mixed;
+  PetscCall(solver_.solve(state, step, report));
+  if (report->converged) solver_.potential().commit(state);
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finished) {
+  PetscFunctionBeginUser;
+  const IncrementalPotential &potential = solver_.potential();
+  const double dt_min = settings_.dt_min > 0 ? settings_.dt_min : settings_.dt / 1024;
+  double dt = settings_.dt;
+  int rejected = 0, good = 0;
+  PetscLogDouble begin, now;
+  PetscCall(PetscTime(&begin));
+  EnergyBudget before = energyBudget(potential.scene(), potential.elements(), state, settings_.dynamic ? 1 : state.time);
+  *finished = false;
+  while (state.time < settings_.t_end) {
+    const double h = std::min(dt, settings_.t_end - state.time);
+    NewtonReport report;
+    PetscCall(step(state, h, &report));
+    if (!report.converged) { // the state was not touched
+      ++rejected;
+      good = 0;
+      dt = 0.5 * h;
+      if (dt >= dt_min) continue;
+      std::ostringstream message;
+      message << (settings_.dynamic ? "step at time " : "load step at factor ") << state.time << " failed with " << (settings_.dynamic ? "dt " : "increment ") << h
+              << ": " << report.reason << " (" << report.iterations << " iterations; residual " << report.residual.force << " of the load, "
+              << report.residual.moment << " of its moment, where -snes_rtol is asked for)";
+      failure_ = message.str();
+      PetscFunctionReturn(0);
+    }
+    if (dt < settings_.dt && ++good >= 4) {
+      dt = std::min(2 * dt, settings_.dt);
+      good = 0;
+    }
+    Diagnostics row;
+    row.time = state.time;
+    row.dt = h;
+    row.energy = energyBudget(potential.scene(), potential.elements(), state, settings_.dynamic ? 1 : state.time);
+    row.dissipated = before.total() - row.energy.total();
+    before = row.energy;
+    row.newton_iterations = report.iterations;
+    row.line_search_trials = report.trials;
+    row.negative_pivots = report.negative_pivots;
+    row.rejected_steps = rejected;
+    PetscCall(PetscTime(&now));
+    row.wall_seconds = now - begin;
+    rejected = 0;
+    PetscCall(observe(state, row));
+  }
+  *finished = true;
+  PetscFunctionReturn(0);
+}
+
+} // namespace tendril

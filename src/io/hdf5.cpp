@@ -1,0 +1,118 @@
+#include "tendril/io/hdf5.hpp"
+
+#include "tendril/model/scene.hpp"
+
+#include <algorithm>
+
+namespace tendril {
+namespace {
+
+template <class Id> Id checked(Id id, const std::string &what) {
+  if (id < 0) throw SceneError(what);
+  return id;
+}
+
+} // namespace
+
+Hdf5File Hdf5File::open(const std::string &path) {
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  Hdf5File f;
+  f.path_ = path;
+  f.file_ = checked(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), path + ": is not a readable HDF5 file");
+  return f;
+}
+
+Hdf5File Hdf5File::create(const std::string &path) {
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  Hdf5File f;
+  f.path_ = path;
+  Hdf5Properties access = H5Pcreate(H5P_FILE_ACCESS);
+  H5Pset_libver_bounds(access, H5F_LIBVER_LATEST, H5F_LIBVER_LATEST); // what appending under readers needs
+  f.file_ = checked(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access), path + ": cannot be written; is another run using it?");
+  return f;
+}
+
+void Hdf5File::startAppending() { checked(H5Fstart_swmr_write(file_), path_ + ": cannot be opened for appending"); }
+
+bool Hdf5File::has(const std::string &name) const { return H5Lexists(file_, name.c_str(), H5P_DEFAULT) > 0; }
+
+std::vector<double> Hdf5File::read(const std::string &name, hsize_t columns) const {
+  if (!has(name)) throw SceneError(path_ + ": has no dataset '" + name + "'");
+  const Hdf5Dataset data = checked(H5Dopen2(file_, name.c_str(), H5P_DEFAULT), path_ + ": '" + name + "' is not a dataset");
+  const Hdf5Space space = H5Dget_space(data);
+  const hssize_t size = H5Sget_simple_extent_npoints(space);
+  const int rank = H5Sget_simple_extent_ndims(space);
+  std::vector<hsize_t> shape(std::max(rank, 1), 1);
+  if (rank > 0) H5Sget_simple_extent_dims(space, shape.data(), nullptr);
+  const bool fits = columns == 1 ? rank == 1 : rank == 2 && shape.back() == columns;
+  if (!fits) throw SceneError(path_ + ": dataset '" + name + "' must have " + (columns == 1 ? "one dimension" : "shape (n, " + std::to_string(columns) + ")"));
+  std::vector<double> values(size);
+  checked(H5Dread(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), path_ + ": '" + name + "' does not hold numbers");
+  for (const double v : values)
+    if (!std::isfinite(v)) throw SceneError(path_ + ": dataset '" + name + "' holds a number that is not finite");
+  return values;
+}
+
+void Hdf5File::createGroup(const std::string &name) {
+  Hdf5Group(checked(H5Gcreate2(file_, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written"));
+}
+
+void Hdf5File::write(const std::string &name, const std::vector<hsize_t> &shape, const double *values) {
+  const Hdf5Space space = H5Screate_simple(int(shape.size()), shape.data(), nullptr);
+  const Hdf5Dataset data = checked(H5Dcreate2(file_, name.c_str(), H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written");
+  checked(H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), path_ + ": cannot be written");
+}
+
+void Hdf5File::write(const std::string &name, const std::vector<hsize_t> &shape, const int *values) {
+  const Hdf5Space space = H5Screate_simple(int(shape.size()), shape.data(), nullptr);
+  const Hdf5Dataset data = checked(H5Dcreate2(file_, name.c_str(), H5T_STD_I32LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written");
+  checked(H5Dwrite(data, H5T_NATIVE_INT, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), path_ + ": cannot be written");
+}
+
+void Hdf5File::writeAttribute(const std::string &name, const std::string &value) {
+  const Hdf5Type type = H5Tcopy(H5T_C_S1);
+  H5Tset_size(type, std::max<std::size_t>(value.size(), 1));
+  H5Tset_cset(type, H5T_CSET_UTF8);
+  const Hdf5Space space = H5Screate(H5S_SCALAR);
+  const Hdf5Attribute a = H5Acreate2(file_, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT);
+  H5Awrite(a, type, value.c_str());
+}
+
+void Hdf5File::writeAttribute(const std::string &name, const std::vector<double> &values) {
+  const hsize_t size = values.size();
+  const Hdf5Space space = H5Screate_simple(1, &size, nullptr);
+  const Hdf5Attribute a = H5Acreate2(file_, name.c_str(), H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT);
+  H5Awrite(a, H5T_NATIVE_DOUBLE, values.data());
+}
+
+void Hdf5File::writeAttribute(const std::string &name, int value) {
+  const Hdf5Space space = H5Screate(H5S_SCALAR);
+  const Hdf5Attribute a = H5Acreate2(file_, name.c_str(), H5T_STD_I32LE, space, H5P_DEFAULT, H5P_DEFAULT);
+  H5Awrite(a, H5T_NATIVE_INT, &value);
+}
+
+Hdf5Series::Hdf5Series(const Hdf5File &file, const std::string &name, const std::vector<hsize_t> &slab, bool integer) : extent_(slab) {
+  extent_.insert(extent_.begin(), 0);
+  std::vector<hsize_t> most = extent_, chunk = extent_;
+  hsize_t bytes = 8;
+  for (const hsize_t n : slab) bytes *= n;
+  most[0] = H5S_UNLIMITED;
+  chunk[0] = std::clamp<hsize_t>((1 << 16) / std::max<hsize_t>(bytes, 1), 1, 1024);
+  const Hdf5Space space = H5Screate_simple(int(extent_.size()), extent_.data(), most.data());
+  const Hdf5Properties create = H5Pcreate(H5P_DATASET_CREATE);
+  H5Pset_chunk(create, int(chunk.size()), chunk.data());
+  const hid_t type = integer ? H5T_STD_I64LE : H5T_IEEE_F64LE;
+  dataset_ = checked(H5Dcreate2(file.id(), name.c_str(), type, space, H5P_DEFAULT, create, H5P_DEFAULT), "dataset " + name + " cannot be created");
+}
+
+void Hdf5Series::append(const double *values) {
+  std::vector<hsize_t> start(extent_.size(), 0), count = extent_;
+  start[0] = extent_[0]++;
+  count[0] = 1;
+  checked(H5Dset_extent(dataset_, extent_.data()), "the trajectory cannot be extended; is the disk full?");
+  const Hdf5Space file_space = H5Dget_space(dataset_), memory = H5Screate_simple(int(count.size()), count.data(), nullptr);
+  H5Sselect_hyperslab(file_space, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
+  checked(H5Dwrite(dataset_, H5T_NATIVE_DOUBLE, memory, file_space, H5P_DEFAULT, values), "the trajectory cannot be written; is the disk full?");
+}
+
+} // namespace tendril

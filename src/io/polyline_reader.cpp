@@ -1,0 +1,120 @@
+#include "tendril/io/polyline_reader.hpp"
+
+#include "tendril/io/hdf5.hpp"
+#include "tendril/model/scene.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+namespace tendril {
+namespace {
+
+[[noreturn]] void fail(const std::string &path, int line, const std::string &message) {
+  throw SceneError(path + ":" + std::to_string(line) + ": " + message);
+}
+
+Vec3 parsePoint(std::istream &in, const std::string &path, int line, const std::string &text) {
+  Vec3 x;
+  std::string word;
+  for (int k = 0; k < 3; ++k) {
+    if (!(in >> word)) fail(path, line, "expected three numbers, found '" + text + "'");
+    std::size_t used = 0;
+    try {
+      x[k] = std::stod(word, &used);
+    } catch (const std::exception &) {
+      used = 0;
+    }
+    if (used != word.size()) fail(path, line, "'" + word + "' is not a number");
+    if (!std::isfinite(x[k])) fail(path, line, "'" + word + "' is not finite");
+  }
+  return x;
+}
+
+std::vector<Polyline> readPoints(std::ifstream &file, const std::string &path) {
+  std::vector<Polyline> lines(1);
+  std::string text;
+  for (int number = 1; std::getline(file, text); ++number) {
+    std::string clean = text.substr(0, text.find('#'));
+    std::replace(clean.begin(), clean.end(), ',', ' ');
+    std::istringstream in(clean);
+    std::string rest;
+    if (!(in >> std::ws) || in.peek() == EOF) {
+      if (text.find('#') == std::string::npos && !lines.back().points.empty()) lines.emplace_back();
+      continue;
+    }
+    lines.back().points.push_back(parsePoint(in, path, number, text));
+    if (in >> rest) fail(path, number, "expected three numbers, found more in '" + text + "'");
+  }
+  if (lines.back().points.empty()) lines.pop_back();
+  return lines;
+}
+
+std::vector<Polyline> readObj(std::ifstream &file, const std::string &path) {
+  std::vector<Vec3> vertices;
+  std::vector<Polyline> lines;
+  std::string text;
+  for (int number = 1; std::getline(file, text); ++number) {
+    std::istringstream in(text);
+    std::string kind;
+    in >> kind;
+    if (kind == "v") vertices.push_back(parsePoint(in, path, number, text));
+    if (kind != "l") continue;
+    Polyline line;
+    std::vector<int> index;
+    for (std::string word; in >> word;) {
+      const int i = std::atoi(word.c_str()), count = int(vertices.size());
+      const int v = i < 0 ? count + i : i - 1;
+      if (i == 0 || v < 0 || v >= count) fail(path, number, "'" + word + "' is not one of the " + std::to_string(count) + " vertices above");
+      index.push_back(v);
+    }
+    if (index.size() > 2 && index.front() == index.back()) {
+      line.closed = true;
+      index.pop_back();
+    }
+    for (const int v : index) line.points.push_back(vertices[v]);
+    lines.push_back(line);
+  }
+  return lines;
+}
+
+std::vector<Polyline> readHdf5(const std::string &path) {
+  const Hdf5File file = Hdf5File::open(path);
+  const std::vector<double> x = file.read("position", 3);
+  const int n = int(x.size() / 3);
+  std::vector<double> offsets{0, double(n)}, closed;
+  if (file.has("rod_vertex_offsets")) offsets = file.read("rod_vertex_offsets", 1);
+  if (file.has("closed")) closed = file.read("closed", 1);
+  std::vector<Polyline> lines;
+  for (std::size_t r = 0; r + 1 < offsets.size(); ++r) {
+    if (offsets[r] < 0 || offsets[r + 1] > n || offsets[r] > offsets[r + 1]) throw SceneError(path + ": 'rod_vertex_offsets' does not fit the " + std::to_string(n) + " rows of 'position'");
+    Polyline line;
+    for (int v = int(offsets[r]); v < int(offsets[r + 1]); ++v) line.points.emplace_back(x[3 * v], x[3 * v + 1], x[3 * v + 2]);
+    line.closed = r < closed.size() && closed[r] != 0;
+    lines.push_back(line);
+  }
+  return lines;
+}
+
+} // namespace
+
+std::vector<Polyline> readPolylines(const std::string &path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), ::tolower);
+  std::ifstream file(path);
+  if (!file) throw SceneError(path + ": cannot be opened; check the path (it is relative to the scene file)");
+  std::vector<Polyline> lines;
+  if (extension == ".csv" || extension == ".txt")
+    lines = readPoints(file, path);
+  else if (extension == ".obj")
+    lines = readObj(file, path);
+  else if (extension == ".h5" || extension == ".hdf5")
+    lines = readHdf5(path);
+  else
+    throw SceneError(path + ": unknown kind of file '" + extension + "'; use .csv, .txt, .obj, .h5 or .hdf5");
+  if (lines.empty()) throw SceneError(path + ": holds no polyline");
+  return lines;
+}
+
+} // namespace tendril

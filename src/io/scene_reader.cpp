@@ -1,0 +1,380 @@
+#include "tendril/io/scene_reader.hpp"
+
+#include "tendril/io/polyline_reader.hpp"
+#include "tendril/io/yaml.hpp"
+#include "tendril/model/builders.hpp"
+
+#include <algorithm>
+#include <filesystem>
+
+namespace tendril {
+namespace {
+
+using Overrides = std::map<std::string, std::string>;
+
+/// Values of a material block: from the file, replaced by the command line.
+class MaterialReader {
+public:
+  MaterialReader(YamlMap &map, const Overrides &overrides) : map_(map), overrides_(overrides) {}
+
+  bool has(const std::string &key) { return map_.has(key) || overrides_.count(key) > 0; }
+
+  double notNegative(const std::string &key) {
+    const YamlValue v = value(key);
+    return v.notNegative();
+  }
+  double positive(const std::string &key) { return value(key).positive(); }
+  double number(const std::string &key) { return value(key).number(); }
+
+  std::array<double, 2> pair(const std::string &key) {
+    const YamlValue v = value(key);
+    if (v.isScalar()) {
+      const double k = v.notNegative();
+      return {k, k};
+    }
+    const std::vector<double> list = v.numbers(2);
+    if (list[0] < 0 || list[1] < 0) v.fail("'" + key + "' must not be negative");
+    return {list[0], list[1]};
+  }
+
+  const YamlValue &block() const { return map_.value(); }
+
+private:
+  YamlMap &map_;
+  const Overrides &overrides_;
+
+  YamlValue value(const std::string &key) {
+    map_.has(key);
+    const auto found = overrides_.find(key);
+    if (found == overrides_.end()) return map_.at(key);
+    return {YAML::Load(found->second), "option -rod_" + key, key};
+  }
+};
+
+Material readSection(MaterialReader &in) {
+  Section section{};
+  const int shapes = int(in.has("radius")) + int(in.has("radii")) + int(in.has("width") || in.has("height"));
+  if (shapes != 1) in.block().fail("a homogeneous section needs one of 'radius', 'radii: [along the first director, along the second]', or 'width' and 'height'");
+  if (in.has("radius"))
+    section = {SectionShape::circle, {in.positive("radius"), 0}};
+  else if (in.has("radii")) {
+    section = {SectionShape::ellipse, in.pair("radii")};
+    if (section.size[0] == 0 || section.size[1] == 0) in.block().fail("'radii' must be greater than zero");
+  } else
+    section = {SectionShape::rectangle, {in.positive("width"), in.positive("height")}};
+  const double young = in.positive("young");
+  if (in.has("poisson") == in.has("shear")) in.block().fail("a homogeneous section needs 'poisson' or 'shear', not both");
+  double shear;
+  if (in.has("shear"))
+    shear = in.positive("shear");
+  else {
+    const double poisson = in.number("poisson");
+    if (poisson <= -1 || poisson > 0.5) in.block().fail("'poisson' must lie in (-1, 0.5]");
+    shear = young / (2 * (1 + poisson));
+  }
+  return homogeneousMaterial(section, young, shear, in.positive("density"));
+}
+
+Material readMaterial(YamlMap &map, const Overrides &overrides) {
+  MaterialReader in(map, overrides);
+  Material m;
+  bool section = false;
+  for (const char *key : {"radius", "radii", "width", "height", "young", "poisson", "shear", "density"}) section = in.has(key) || section;
+  if (section) m = readSection(in);
+  // The stiffness parameters; beside a section they replace what follows from it.
+  if (in.has("linear_density")) m.linear_density = in.positive("linear_density");
+  if (in.has("linear_rotational_inertia")) m.linear_rotational_inertia = in.notNegative("linear_rotational_inertia");
+  if (in.has("axial_stiffness")) m.axial_stiffness = in.positive("axial_stiffness");
+  if (in.has("torsional_stiffness")) m.torsional_stiffness = in.notNegative("torsional_stiffness");
+  if (in.has("flexural_stiffness")) m.flexural_stiffness = in.pair("flexural_stiffness");
+  if (in.has("mass_damping_coefficient")) m.mass_damping_coefficient = in.notNegative("mass_damping_coefficient");
+  if (in.has("stiffness_damping_coefficient")) m.stiffness_damping_coefficient = in.notNegative("stiffness_damping_coefficient");
+  map.finish();
+  return m;
+}
+
+Vec3 unit(const YamlValue &value) {
+  const Vec3 v = value.vector();
+  if (v.norm() == 0) value.fail("'" + value.name() + "' must not be zero");
+  return v.normalized();
+}
+
+/// Shapes a rod block may give; exactly one must be there.
+std::vector<Polyline> readShape(YamlMap &rod) {
+  std::vector<Polyline> shapes;
+  int given = 0;
+  if (rod.has("line") && ++given) {
+    YamlMap m(rod.at("line"));
+    shapes = {lineShape(m.at("from").vector(), m.at("to").vector(), m.at("edges").integer(1))};
+    m.finish();
+  }
+  if (rod.has("ring") && ++given) {
+    YamlMap m(rod.at("ring"));
+    shapes = {ringShape(m.vector("center", Vec3::Zero()), m.has("normal") ? unit(m.at("normal")) : Vec3::UnitZ(), m.at("radius").positive(), m.at("edges").integer(3))};
+    m.finish();
+  }
+  if (rod.has("helix") && ++given) {
+    YamlMap m(rod.at("helix"));
+    HelixShape h;
+    h.origin = m.vector("origin", Vec3::Zero());
+    h.axis = m.has("axis") ? unit(m.at("axis")) : Vec3::UnitX();
+    h.start = m.has("start") ? unit(m.at("start")) : anyNormal(h.axis);
+    if (std::abs(h.start.dot(h.axis)) > 1e-6) m.at("start").fail("'start' must be normal to 'axis'");
+    h.length = m.at("length").positive();
+    h.radius = m.at("radius").positive();
+    h.turns = m.at("turns").number();
+    h.taper = m.has("taper") ? m.at("taper").notNegative() : 0;
+    h.edges = m.at("edges").integer(2);
+    shapes = {helixShape(h)};
+    m.finish();
+  }
+  if (rod.has("points") && ++given) {
+    Polyline p;
+    for (const YamlValue &v : rod.at("points").items()) p.points.push_back(v.vector());
+    shapes = {p};
+  }
+  if (rod.has("file") && ++given) {
+    const YamlValue v = rod.at("file");
+    const std::filesystem::path path(v.text());
+    shapes = readPolylines(path.is_absolute() ? path.string() : (std::filesystem::path(v.file()).parent_path() / path).string());
+  }
+  if (given != 1) rod.value().fail("a rod needs exactly one shape: line, ring, helix, points or file; found " + std::to_string(given));
+  return shapes;
+}
+
+void readDirectors(YamlMap &map, Rod &rod) {
+  if (map.has("directors")) {
+    const YamlValue list = map.at("directors");
+    const auto items = list.items();
+    if (int(items.size()) != rod.edges()) list.fail("'directors' must have one vector per edge (" + std::to_string(rod.edges()) + "), found " + std::to_string(items.size()));
+    for (int i = 0; i < rod.edges(); ++i) {
+      const Vec3 d = unit(items[i]), t = rod.edge(i).normalized();
+      if (std::abs(d.dot(t)) > 1e-6) items[i].fail("director " + std::to_string(i) + " is not normal to its edge (cosine " + std::to_string(d.dot(t)) + "); take away its part along the edge");
+      rod.director.push_back(orthonormalised(d, t));
+    }
+    return;
+  }
+  Vec3 start = Vec3::Zero();
+  if (map.has("director")) {
+    const YamlValue v = map.at("director");
+    start = unit(v);
+    const double cosine = start.dot(rod.edge(0).normalized());
+    if (std::abs(cosine) > 1e-6) v.fail("'director' is not normal to the first edge (cosine " + std::to_string(cosine) + "); take away its part along the edge");
+  }
+  setBishopDirectors(rod, start);
+}
+
+void readNatural(YamlMap &map, Rod &rod) {
+  if (!map.has("natural")) return;
+  const YamlValue v = map.at("natural");
+  if (v.isMap()) {
+    YamlMap m(v);
+    rod.natural = Rod::Natural::given;
+    if (m.has("curvature")) {
+      const std::vector<double> k = m.at("curvature").numbers(2);
+      rod.natural_strain.head<2>() = Eigen::Vector2d(k[0], k[1]);
+    }
+    rod.natural_strain[2] = m.number("twist", 0);
+    m.finish();
+  } else if (v.oneOf({"as_drawn", "straight"}) == "straight")
+    rod.natural = Rod::Natural::given;
+}
+
+void readRod(const YamlValue &value, const Overrides &overrides, std::vector<Rod> &rods) {
+  YamlMap map(value);
+  const std::string name = map.has("name") ? map.at("name").text() : "rod" + std::to_string(rods.size());
+  const std::vector<Polyline> shapes = readShape(map);
+  Rod common;
+  if (map.has("material")) {
+    YamlMap material(map.at("material"));
+    common.material = readMaterial(material, overrides);
+  } else {
+    YamlMap material(YamlValue(YAML::Load("{}"), value.file(), "material"));
+    common.material = readMaterial(material, overrides);
+  }
+  std::string measure = map.has("measure") ? map.at("measure").oneOf({"tan", "angle"}) : "tan";
+  if (const auto o = overrides.find("measure"); o != overrides.end()) measure = YamlValue(YAML::Node(o->second), "option -rod_measure", "measure").oneOf({"tan", "angle"});
+  common.measure = measure == "tan" ? Measure::tan : Measure::angle;
+  common.gravity = !map.has("gravity") || map.at("gravity").boolean();
+  common.initial_velocity = map.vector("velocity", Vec3::Zero());
+  common.initial_turns = map.number("turns", 0);
+  readNatural(map, common);
+  const bool closed = map.has("closed") && map.at("closed").boolean();
+  int copies = 1;
+  Vec3 offset = Vec3::Zero();
+  if (map.has("copies")) {
+    YamlMap m(map.at("copies"));
+    copies = m.at("count").integer(1);
+    offset = m.at("offset").vector();
+    m.finish();
+  }
+  for (int copy = 0; copy < copies; ++copy)
+    for (std::size_t k = 0; k < shapes.size(); ++k) {
+      Rod rod = common;
+      rod.name = name;
+      if (shapes.size() > 1) rod.name += "." + std::to_string(k);
+      if (copies > 1) rod.name += "#" + std::to_string(copy);
+      rod.position = shapes[k].points;
+      rod.closed = shapes[k].closed || closed;
+      for (Vec3 &x : rod.position) x += double(copy) * offset;
+      try {
+        checkRod(rod);
+      } catch (const SceneError &e) {
+        value.fail(e.what());
+      }
+      readDirectors(map, rod);
+      if (rod.closed && rod.initial_turns != std::round(rod.initial_turns)) map.at("turns").fail("'turns' of a closed rod must be a whole number, or its ends do not meet");
+      if (rod.material.isCable() && rod.initial_turns != 0) map.at("turns").fail("a rod without flexural stiffness has no twist");
+      rods.push_back(rod);
+    }
+  map.finish();
+}
+
+/// Rods a support or load speaks of: a name, a number, or `all`.
+std::vector<int> readTargets(YamlMap &map, const std::vector<Rod> &rods) {
+  std::vector<int> found;
+  if (!map.has("rod")) {
+    if (rods.size() > 1) map.value().fail("say which 'rod' is meant: a name, a number from 0, or all");
+    return {0};
+  }
+  const YamlValue v = map.at("rod");
+  const std::string word = v.text();
+  for (std::size_t r = 0; r < rods.size(); ++r) {
+    const std::string &name = rods[r].name;
+    if (word == "all" || name == word || name.rfind(word + ".", 0) == 0 || name.rfind(word + "#", 0) == 0 || std::to_string(r) == word) found.push_back(int(r));
+  }
+  if (found.empty()) v.fail("there is no rod '" + word + "'; write the name of a rod, its number from 0 to " + std::to_string(rods.size() - 1) + ", or all");
+  return found;
+}
+
+int readIndex(const YamlValue &v, int count, const std::string &rod) {
+  if (v.isScalar() && v.node().Scalar() == "last") return count - 1;
+  const int i = v.integer(0);
+  if (i >= count) v.fail("'" + v.name() + "' " + std::to_string(i) + " is out of range: rod '" + rod + "' has " + std::to_string(count) + ", numbered 0 to " + std::to_string(count - 1));
+  return i;
+}
+
+Motion readMotion(const YamlValue &value) {
+  YamlMap map(value);
+  Motion m;
+  m.velocity = map.vector("velocity", Vec3::Zero());
+  m.angular_velocity = map.vector("angular_velocity", Vec3::Zero());
+  if (map.has("table")) {
+    if (map.has("velocity") || map.has("angular_velocity")) value.fail("'motion' takes a 'table' or velocities, not both");
+    for (const YamlValue &row : map.at("table").items()) {
+      const std::size_t n = row.node().size();
+      if (n != 4 && n != 7) row.fail("a row of 'table' is [time, dx, dy, dz] or [time, dx, dy, dz, rx, ry, rz]");
+      const std::vector<double> v = row.numbers(n);
+      m.table.push_back({v[0], Vec3(v[1], v[2], v[3]), n == 7 ? Vec3(v[4], v[5], v[6]) : Vec3(Vec3::Zero())});
+      if (m.table.size() > 1 && m.table[m.table.size() - 2].time >= v[0]) row.fail("the times of 'table' must increase");
+    }
+    if (m.table.empty()) value.fail("'table' is empty");
+  }
+  map.finish();
+  return m;
+}
+
+void readSupport(const YamlValue &value, Scene &scene) {
+  YamlMap map(value);
+  const std::string type = map.at("type").oneOf({"clamp", "pin", "fix_twist"});
+  for (const int r : readTargets(map, scene.rods)) {
+    const Rod &rod = scene.rods[r];
+    Support s{};
+    s.kind = type == "clamp" ? Support::Kind::clamp : type == "pin" ? Support::Kind::pin : Support::Kind::fix_twist;
+    s.rod = r;
+    s.vertex = readIndex(map.at("vertex"), rod.vertices(), rod.name);
+    for (const Support &other : scene.supports)
+      if (other.rod == r && other.vertex == s.vertex && ((other.holdsPosition() && s.holdsPosition()) || (other.holdsTwist() && s.holdsTwist())))
+        value.fail("vertex " + std::to_string(s.vertex) + " of rod '" + rod.name + "' is held twice");
+    s.frame = frameAtVertex(rod, s.vertex);
+    if (type != "pin") {
+      if (map.has("tangent")) s.frame.tangent = unit(map.at("tangent"));
+      s.frame.director = orthonormalised(s.frame.director, s.frame.tangent);
+      if (map.has("director")) {
+        const YamlValue d = map.at("director");
+        const Vec3 v = unit(d);
+        if (std::abs(v.dot(s.frame.tangent)) > 1e-6) d.fail("'director' is not normal to the tangent of the support");
+        s.frame.director = v;
+      }
+      if (!s.frame.director.allFinite()) value.fail("'tangent' is parallel to the rod's director; give a 'director' too");
+    }
+    if (map.has("motion")) s.motion = readMotion(map.at("motion"));
+    scene.supports.push_back(s);
+  }
+  map.finish();
+}
+
+void readLoad(const YamlValue &value, Scene &scene) {
+  YamlMap map(value);
+  for (const int r : readTargets(map, scene.rods)) {
+    const Rod &rod = scene.rods[r];
+    if (map.has("force")) {
+      scene.forces.push_back({r, readIndex(map.at("vertex"), rod.vertices(), rod.name), map.at("force").vector()});
+    } else if (map.has("torque") || map.has("moment")) {
+      if (rod.material.isCable()) value.fail("rod '" + rod.name + "' has no flexural stiffness: it cannot carry a torque or moment");
+      EdgeMoment m{r, readIndex(map.at("edge"), rod.edges(), rod.name), 0, Vec3::Zero()};
+      if (map.has("torque")) m.torque = map.at("torque").number();
+      if (map.has("moment")) m.moment = map.at("moment").vector();
+      scene.moments.push_back(m);
+    } else
+      value.fail("a load needs 'vertex' and 'force', or 'edge' and 'torque' or 'moment'");
+  }
+  map.finish();
+}
+
+void readRun(const YamlValue &value, RunSettings &run) {
+  YamlMap map(value);
+  if (map.has("mode")) run.mode = map.at("mode").oneOf({"dynamic", "static"});
+  if (map.has("dt")) run.dt = map.at("dt").positive();
+  if (map.has("t_end")) run.t_end = map.at("t_end").positive();
+  if (map.has("load_steps")) run.load_steps = map.at("load_steps").integer(1);
+  map.finish();
+}
+
+} // namespace
+
+const std::vector<std::pair<std::string, std::string>> &rodOverrides() {
+  static const std::vector<std::pair<std::string, std::string>> list{
+      {"radius", "radius of a circular section [m]"},
+      {"radii", "semi-axes of an elliptic section, e.g. [2e-3,1e-3] [m]"},
+      {"width", "width of a rectangular section, along the first director [m]"},
+      {"height", "height of a rectangular section, along the second director [m]"},
+      {"young", "Young's modulus [Pa]"},
+      {"poisson", "Poisson's ratio"},
+      {"shear", "shear modulus [Pa]"},
+      {"density", "density [kg/m^3]"},
+      {"linear_density", "mass per length [kg/m]"},
+      {"linear_rotational_inertia", "rotational inertia about the axis per length [kg m]"},
+      {"axial_stiffness", "EA [N]"},
+      {"torsional_stiffness", "GJ [N m^2]"},
+      {"flexural_stiffness", "EI, one number or [kb1,kb2] [N m^2]"},
+      {"mass_damping_coefficient", "dissipation proportional to mass [1/s]"},
+      {"stiffness_damping_coefficient", "dissipation proportional to stiffness [s]"},
+      {"measure", "strain measure: tan or angle"}};
+  return list;
+}
+
+SceneFile readScene(const std::string &path, const Overrides &overrides) {
+  YAML::Node root;
+  try {
+    root = YAML::LoadFile(path);
+  } catch (const YAML::BadFile &) {
+    throw SceneError(path + ": cannot be opened; give an existing scene file with -scene");
+  } catch (const YAML::Exception &e) {
+    throw SceneError(path + ":" + std::to_string(e.mark.line + 1) + ": not valid YAML: " + e.msg);
+  }
+  SceneFile out;
+  YamlMap map(YamlValue(root, path, "scene"));
+  out.scene.gravity = map.vector("gravity", Vec3(0, -9.81, 0));
+  if (map.has("simulation")) readRun(map.at("simulation"), out.run);
+  for (const YamlValue &v : map.at("rods").items()) readRod(v, overrides, out.scene.rods);
+  if (out.scene.rods.empty()) map.at("rods").fail("a scene needs at least one rod");
+  if (map.has("supports"))
+    for (const YamlValue &v : map.at("supports").items()) readSupport(v, out.scene);
+  if (map.has("loads"))
+    for (const YamlValue &v : map.at("loads").items()) readLoad(v, out.scene);
+  map.finish();
+  return out;
+}
+
+} // namespace tendril

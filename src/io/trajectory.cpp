@@ -1,0 +1,194 @@
+#include "tendril/io/trajectory.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <iomanip>
+
+namespace tendril {
+namespace {
+
+struct Field {
+  const char *name;
+  bool on_vertices;
+  hsize_t components;
+  const double *(*data)(const State &);
+};
+
+const Field fields[] = {
+    {"position", true, 3, [](const State &s) { return s.position[0].data(); }},
+    {"director", false, 3, [](const State &s) { return s.director[0].data(); }},
+    {"velocity", true, 3, [](const State &s) { return s.velocity[0].data(); }},
+    {"twist_rate", false, 1, [](const State &s) { return s.twist_rate.data(); }},
+    {"axial_force", false, 1, [](const State &s) { return s.axial_force.data(); }},
+};
+
+template <class Get> std::vector<double> perRod(const Scene &scene, Get get) {
+  std::vector<double> values;
+  for (const Rod &rod : scene.rods) values.push_back(get(rod.material));
+  return values;
+}
+
+} // namespace
+
+const std::vector<std::string> &TrajectoryWriter::fieldNames() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> n;
+    for (const Field &f : fields) n.push_back(f.name);
+    return n;
+  }();
+  return names;
+}
+
+const std::vector<std::string> &Diagnostics::names() {
+  static const std::vector<std::string> names{"time", "dt", "kinetic", "stretch", "bend", "twist", "gravity", "dissipated", "newton_iterations",
+                                              "line_search_trials", "negative_pivots", "rejected_steps", "wall_seconds"};
+  return names;
+}
+
+std::vector<double> Diagnostics::values() const {
+  return {time, dt, energy.kinetic, energy.stretch, energy.bend, energy.twist, energy.gravity, dissipated, double(newton_iterations),
+          double(line_search_trials), double(negative_pivots), double(rejected_steps), wall_seconds};
+}
+
+TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene, const Elements &elements, const Provenance &provenance,
+                                   const std::set<std::string> &wanted)
+    : folder_(folder), vertices_(int(elements.mass.size())), edges_(int(elements.vertex0.size())), file_(Hdf5File::create(folder + "/trajectory.h5")) {
+  for (const RodRange &rod : elements.rods) {
+    rod_vertices_.push_back(rod.vertices);
+    closed_.push_back(rod.closed);
+  }
+  writeHeader(scene, elements, provenance);
+  file_.createGroup("state");
+  for (const Field &f : fields) {
+    if (std::string(f.name) != "position" && !wanted.count(f.name)) continue;
+    std::vector<hsize_t> slab{hsize_t(f.on_vertices ? vertices_ : edges_)};
+    if (f.components > 1) slab.push_back(f.components);
+    state_.emplace_back(f.name, std::make_unique<Hdf5Series>(file_, std::string("state/") + f.name, slab));
+  }
+  file_.createGroup("diagnostics");
+  for (const std::string &name : Diagnostics::names()) diagnostics_.push_back(std::make_unique<Hdf5Series>(file_, "diagnostics/" + name, std::vector<hsize_t>{}));
+  step_ = std::make_unique<Hdf5Series>(file_, "step", std::vector<hsize_t>{}, true);
+  time_ = std::make_unique<Hdf5Series>(file_, "time", std::vector<hsize_t>{});
+  file_.startAppending();
+}
+
+TrajectoryWriter::~TrajectoryWriter() { writeXdmf(); }
+
+void TrajectoryWriter::writeHeader(const Scene &scene, const Elements &elements, const Provenance &p) {
+  file_.writeAttribute("format", std::string("tendril-trajectory"));
+  file_.writeAttribute("format_version", 1);
+  file_.writeAttribute("gravity", std::vector<double>(scene.gravity.data(), scene.gravity.data() + 3));
+  file_.writeAttribute("tendril_version", p.version);
+  file_.writeAttribute("git_commit", p.git_commit);
+  file_.writeAttribute("petsc_version", p.petsc_version);
+  file_.writeAttribute("command_line", p.command_line);
+  file_.writeAttribute("options", p.options);
+  file_.writeAttribute("created", p.created);
+  file_.writeAttribute("ranks", p.ranks);
+
+  const hsize_t nr = scene.rods.size();
+  std::vector<int> vertex_offsets{0}, edge_offsets{0}, closed, ends;
+  std::vector<double> position, director;
+  for (std::size_t r = 0; r < nr; ++r) {
+    vertex_offsets.push_back(vertex_offsets.back() + elements.rods[r].vertices);
+    edge_offsets.push_back(edge_offsets.back() + elements.rods[r].edges);
+    closed.push_back(scene.rods[r].closed);
+    for (const Vec3 &x : scene.rods[r].position) position.insert(position.end(), x.data(), x.data() + 3);
+    for (const Vec3 &d : scene.rods[r].director) director.insert(director.end(), d.data(), d.data() + 3);
+  }
+  for (int i = 0; i < edges_; ++i) ends.insert(ends.end(), {elements.vertex0[i], elements.vertex1[i]});
+  file_.createGroup("topology");
+  file_.write("topology/rod_vertex_offsets", {nr + 1}, vertex_offsets.data());
+  file_.write("topology/rod_edge_offsets", {nr + 1}, edge_offsets.data());
+  file_.write("topology/closed", {nr}, closed.data());
+  file_.write("topology/edges", {hsize_t(edges_), 2}, ends.data());
+  file_.createGroup("reference");
+  file_.write("reference/position", {hsize_t(vertices_), 3}, position.data());
+  file_.write("reference/director", {hsize_t(edges_), 3}, director.data());
+  file_.createGroup("material");
+  auto writeMaterial = [&](const char *name, auto get) { file_.write(std::string("material/") + name, {nr}, perRod(scene, get).data()); };
+  writeMaterial("linear_density", [](const Material &m) { return m.linear_density; });
+  writeMaterial("linear_rotational_inertia", [](const Material &m) { return m.linear_rotational_inertia; });
+  writeMaterial("axial_stiffness", [](const Material &m) { return m.axial_stiffness; });
+  writeMaterial("torsional_stiffness", [](const Material &m) { return m.torsional_stiffness; });
+  writeMaterial("mass_damping_coefficient", [](const Material &m) { return m.mass_damping_coefficient; });
+  writeMaterial("stiffness_damping_coefficient", [](const Material &m) { return m.stiffness_damping_coefficient; });
+  std::vector<double> flexural;
+  for (const Rod &rod : scene.rods) flexural.insert(flexural.end(), rod.material.flexural_stiffness.begin(), rod.material.flexural_stiffness.end());
+  file_.write("material/flexural_stiffness", {nr, 2}, flexural.data());
+}
+
+/// The time of a frame is written last: frames are complete up to the length of /time, whenever the run is killed.
+void TrajectoryWriter::writeFrame(const State &state) {
+  for (const Field &f : fields)
+    for (auto &[name, series] : state_)
+      if (name == f.name) {
+        series->append(f.data(state));
+        series->flush();
+      }
+  const double step = double(state.step);
+  step_->append(&step);
+  step_->flush();
+  time_->append(&state.time);
+  time_->flush();
+  times_.push_back(state.time);
+  if ((times_.size() & (times_.size() - 1)) == 0) writeXdmf(); // now and then: a killed run keeps a usable one
+}
+
+void TrajectoryWriter::writeDiagnostics(const Diagnostics &row) {
+  const std::vector<double> values = row.values();
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    diagnostics_[k]->append(&values[k]);
+    diagnostics_[k]->flush();
+  }
+}
+
+void TrajectoryWriter::writeXdmf() const {
+  const std::string path = folder_ + "/trajectory.xdmf";
+  {
+    std::ofstream out(path + ".part");
+    out << std::setprecision(17);
+    const std::size_t nt = times_.size();
+    std::size_t entries = 0;
+    for (std::size_t r = 0; r < rod_vertices_.size(); ++r) entries += std::size_t(rod_vertices_[r]) + 2 + (closed_[r] ? 1 : 0);
+    out << "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n <Domain>\n"
+        << "  <Topology TopologyType=\"Mixed\" NumberOfElements=\"" << rod_vertices_.size() << "\">\n   <DataItem Format=\"XML\" NumberType=\"Int\" Dimensions=\"" << entries << "\">\n";
+    int first = 0;
+    for (std::size_t r = 0; r < rod_vertices_.size(); ++r) {
+      const int n = rod_vertices_[r];
+      out << "    2 " << n + (closed_[r] ? 1 : 0); // 2: polyline
+      for (int v = 0; v < n; ++v) out << " " << first + v;
+      if (closed_[r]) out << " " << first;
+      out << "\n";
+      first += n;
+    }
+    out << "   </DataItem>\n  </Topology>\n  <Grid Name=\"rods\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
+    // One frame out of a dataset (nt, n[, 3]).
+    auto slab = [&](const std::string &name, int n, int components, std::size_t frame) {
+      const std::string tail = components > 1 ? " " + std::to_string(components) : "";
+      const int rank = components > 1 ? 3 : 2;
+      out << "     <DataItem ItemType=\"HyperSlab\" Dimensions=\"" << n << tail << "\" Type=\"HyperSlab\">\n      <DataItem Dimensions=\"3 " << rank
+          << "\" Format=\"XML\">" << frame << (rank == 3 ? " 0 0 1 1 1 1 " : " 0 1 1 1 ") << n << tail << "</DataItem>\n      <DataItem Dimensions=\"" << nt
+          << " " << n << tail << "\" NumberType=\"Float\" Precision=\"8\" Format=\"HDF\">trajectory.h5:/state/" << name << "</DataItem>\n     </DataItem>\n";
+    };
+    for (std::size_t frame = 0; frame < nt; ++frame) {
+      out << "   <Grid Name=\"frame\" GridType=\"Uniform\">\n    <Time Value=\"" << times_[frame] << "\"/>\n"
+          << "    <Topology Reference=\"/Xdmf/Domain/Topology[1]\"/>\n    <Geometry GeometryType=\"XYZ\">\n";
+      slab("position", vertices_, 3, frame);
+      out << "    </Geometry>\n";
+      for (const Field &f : fields)
+        for (const auto &[name, series] : state_) {
+          if (name != f.name || name == "position" || !f.on_vertices) continue;
+          out << "    <Attribute Name=\"" << name << "\" AttributeType=\"" << (f.components > 1 ? "Vector" : "Scalar") << "\" Center=\"Node\">\n";
+          slab(name, vertices_, int(f.components), frame);
+          out << "    </Attribute>\n";
+        }
+      out << "   </Grid>\n";
+    }
+    out << "  </Grid>\n </Domain>\n</Xdmf>\n";
+  }
+  std::error_code ignored;
+  std::filesystem::rename(path + ".part", path, ignored);
+}
+
+} // namespace tendril

@@ -1,0 +1,125 @@
+#include "tendril/model/scene.hpp"
+
+#include <algorithm>
+#include <sstream>
+
+namespace tendril {
+namespace {
+
+double degrees(double radians) { return radians * 180 / pi; }
+
+/// Fraction of the way through the interval that holds `time`, and the interval's left end.
+std::pair<std::size_t, double> locate(const std::vector<Motion::Key> &table, double time) {
+  if (time <= table.front().time) return {0, 0.0};
+  if (time >= table.back().time) return {table.size() - 1, 0.0};
+  const auto right = std::upper_bound(table.begin(), table.end(), time, [](double t, const Motion::Key &k) { return t < k.time; });
+  const std::size_t i = std::size_t(right - table.begin()) - 1;
+  return {i, (time - table[i].time) / (table[i + 1].time - table[i].time)};
+}
+
+Vec3 interpolate(const std::vector<Motion::Key> &table, double time, Vec3 Motion::Key::*member) {
+  const auto [i, s] = locate(table, time);
+  return s == 0 ? table[i].*member : Vec3((1 - s) * (table[i].*member) + s * (table[i + 1].*member));
+}
+
+} // namespace
+
+Vec3 Motion::displacementAt(double time) const {
+  return table.empty() ? Vec3(velocity * time) : interpolate(table, time, &Key::displacement);
+}
+
+Mat3 Motion::rotationAt(double time) const {
+  const Vec3 r = table.empty() ? Vec3(angular_velocity * time) : interpolate(table, time, &Key::rotation);
+  const double angle = r.norm();
+  if (angle == 0) return Mat3::Identity();
+  return Eigen::AngleAxisd(angle, r / angle).toRotationMatrix();
+}
+
+void setBishopDirectors(Rod &rod, const Vec3 &start) {
+  const int ne = rod.edges();
+  rod.director.resize(ne);
+  Vec3 t = rod.edge(0).normalized();
+  rod.director[0] = start.isZero(0) ? anyNormal(t) : orthonormalised(start, t);
+  for (int i = 1; i < ne; ++i) {
+    const Vec3 next = rod.edge(i).normalized();
+    rod.director[i] = orthonormalised(transport<double>(rod.director[i - 1], t, next), next);
+    t = next;
+  }
+  if (!rod.closed) return;
+  // Angle from the frame that comes round to the first one, spread over the round by arc length between edge midpoints.
+  const double holonomy = halfAngleBetween(referenceFrame(rod, ne - 1), referenceFrame(rod, 0)).angle();
+  double length = 0, along = 0;
+  for (int i = 0; i < ne; ++i) length += rod.edge(i).norm();
+  for (int i = 1; i < ne; ++i) {
+    along += 0.5 * (rod.edge(i - 1).norm() + rod.edge(i).norm());
+    const Vec3 ti = rod.edge(i).normalized();
+    rod.director[i] = rotateAbout<double>(rod.director[i], ti, holonomy * along / length);
+  }
+}
+
+Frame referenceFrame(const Rod &rod, int edge) {
+  const Vec3 e = rod.edge(edge);
+  const double length = e.norm();
+  return {e / length, rod.director[edge], length};
+}
+
+Frame frameAtVertex(const Rod &rod, int vertex) {
+  const int a = rod.edgeBefore(vertex), b = rod.edgeAfter(vertex);
+  if (a >= 0 && b >= 0) {
+    const Frame f0 = referenceFrame(rod, a), f1 = referenceFrame(rod, b);
+    const Vec3 t = (f0.tangent + f1.tangent).normalized();
+    const Vec3 d = transport<double>(f0.director, f0.tangent, t) + transport<double>(f1.director, f1.tangent, t);
+    return {t, orthonormalised(d, t), 1};
+  }
+  const int end = a < 0 ? b : a, inner = a < 0 ? rod.edgeAfter(vertex + 1) : rod.edgeBefore(vertex - 1);
+  Frame f = referenceFrame(rod, end);
+  if (inner >= 0) {
+    const Frame g = referenceFrame(rod, inner);
+    const Vec3 t = (f.tangent - (g.tangent - f.tangent) * f.length / (f.length + g.length)).normalized();
+    f.director = orthonormalised(transport<double>(f.director, f.tangent, t), t);
+    f.tangent = t;
+  }
+  f.length = 1;
+  return f;
+}
+
+void checkRod(const Rod &rod) {
+  auto fail = [&](auto &&...parts) {
+    std::ostringstream message;
+    message << "rod '" << rod.name << "': ";
+    (message << ... << parts);
+    throw SceneError(message.str());
+  };
+  const int minimum = rod.closed ? 3 : 2;
+  if (rod.vertices() < minimum) fail("has ", rod.vertices(), " vertices; a", rod.closed ? " closed" : "n open", " rod needs at least ", minimum);
+  double scale = 0;
+  for (const Vec3 &x : rod.position) scale = std::max(scale, (x - rod.position[0]).norm());
+  for (int i = 0; i < rod.vertices(); ++i)
+    if (!rod.position[i].allFinite()) fail("vertex ", i, " has a coordinate that is not finite");
+  for (int i = 0; i < rod.edges(); ++i)
+    if (rod.edge(i).norm() <= 1e-12 * scale) fail("edge ", i, " (vertex ", i, " to ", rod.next(i), ") has zero length; remove one of the two vertices");
+  for (int v = 0; v < rod.vertices(); ++v) {
+    const int a = rod.edgeBefore(v), b = rod.edgeAfter(v);
+    if (a < 0 || b < 0) continue;
+    const double c = rod.edge(a).normalized().dot(rod.edge(b).normalized());
+    if (c < -0.9999) fail("folds back on itself at vertex ", v, " (turning angle ", degrees(std::acos(std::max(-1.0, c))), " degrees); edges may turn by less than 179");
+  }
+}
+
+DimensionlessGroups dimensionlessGroups(const Rod &rod, const Vec3 &gravity) {
+  DimensionlessGroups g{};
+  for (int i = 0; i < rod.edges(); ++i) g.length += rod.edge(i).norm();
+  const double ei = std::min(rod.material.flexural_stiffness[0], rod.material.flexural_stiffness[1]);
+  g.gravito_bending = rod.gravity ? rod.material.linear_density * gravity.norm() * std::pow(g.length, 3) / ei : 0;
+  g.axial_to_bending = rod.material.axial_stiffness * g.length * g.length / ei;
+  for (int v = 0; v < rod.vertices(); ++v) {
+    const int a = rod.edgeBefore(v), b = rod.edgeAfter(v);
+    if (a < 0 || b < 0) continue;
+    const Frame f0 = referenceFrame(rod, a), f1 = referenceFrame(rod, b);
+    g.largest_turning = std::max(g.largest_turning, degrees(std::acos(std::clamp(f0.tangent.dot(f1.tangent), -1.0, 1.0))));
+    g.largest_twist = std::max(g.largest_twist, std::abs(degrees(halfAngleBetween(f0, f1).angle())));
+  }
+  return g;
+}
+
+} // namespace tendril

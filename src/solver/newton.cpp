@@ -1,0 +1,448 @@
+#include "tendril/solver/newton.hpp"
+
+#include "tendril/solver/events.hpp"
+
+#include <petsc/private/linesearchimpl.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace tendril {
+namespace {
+
+constexpr const char *line_search_name = "retraction";
+
+PetscErrorCode functionCallback(SNES, Vec x, Vec f, void *context) { return static_cast<NewtonSolver *>(context)->evaluate(x, f); }
+
+PetscErrorCode jacobianCallback(SNES, Vec, Mat, Mat p, void *context) { return static_cast<NewtonSolver *>(context)->assemble(p); }
+
+PetscErrorCode convergenceCallback(SNES, PetscInt it, PetscReal, PetscReal, PetscReal, SNESConvergedReason *reason, void *context) {
+  return static_cast<NewtonSolver *>(context)->testConvergence(it, reason);
+}
+
+PetscErrorCode lineSearchApply(SNESLineSearch search) {
+  SNES snes;
+  void *context;
+  PetscFunctionBeginUser;
+  PetscCall(SNESLineSearchGetSNES(search, &snes));
+  PetscCall(SNESGetApplicationContext(snes, &context));
+  PetscCall(static_cast<NewtonSolver *>(context)->lineSearch(search));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode createLineSearch(SNESLineSearch search) {
+  PetscFunctionBeginUser;
+  search->ops->apply = lineSearchApply;
+  PetscFunctionReturn(0);
+}
+
+double dot(const std::vector<double> &a, const std::vector<double> &b) {
+  double sum = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) sum += a[k] * b[k];
+  return sum;
+}
+
+/// Diagonal by which an indefinite Hessian is shifted: the mass of each position, and for twists a moment of the same mass over the
+/// edge's length, so that both see curvature on the scale of an edge alike. Independent of units and of the time step.
+std::vector<double> shiftMetric(const IncrementalPotential &potential) {
+  const Elements &e = potential.elements();
+  std::vector<double> metric(potential.scene().rods.empty() ? 0 : e.vertex_row.size() * 8 + 64, 0.0);
+  metric.clear();
+  int rows = 0;
+  for (const RodRange &rod : e.rods) rows = std::max(rows, rod.first_row + rod.rows + 32);
+  metric.assign(rows, 0.0);
+  for (std::size_t v = 0; v < e.vertex_row.size(); ++v)
+    for (int a = 0; a < 3; ++a) metric[e.vertex_row[v] + a] = e.mass[v];
+  for (const RodRange &rod : e.rods)
+    if (rod.stride == 4)
+      for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i)
+        metric[e.edge_row[i] + 3] = 0.5 * (e.mass[e.vertex0[i]] + e.mass[e.vertex1[i]]) * e.rest_length[i] * e.rest_length[i];
+  return metric;
+}
+
+} // namespace
+
+PetscErrorCode registerSolvers() {
+  PetscFunctionBeginUser;
+  PetscCall(SNESLineSearchRegister(line_search_name, createLineSearch));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential) {
+  KSP ksp;
+  PC pc;
+  SNESLineSearch search;
+  PetscFunctionBeginUser;
+  potential_ = &potential;
+  metric_ = shiftMetric(potential);
+  DofMap &dofs = potential.dofs();
+  PetscCall(dofs.createMatrix(jacobian_.out()));
+  PetscCall(DMCreateGlobalVector(dofs.dm(), x_.out()));
+  PetscCall(VecDuplicate(x_, f_.out()));
+  PetscCall(SNESCreate(PETSC_COMM_WORLD, snes_.out()));
+  PetscCall(SNESSetDM(snes_, dofs.dm()));
+  PetscCall(SNESSetApplicationContext(snes_, this));
+  PetscCall(SNESSetType(snes_, SNESNEWTONLS));
+  PetscCall(SNESSetFunction(snes_, f_, functionCallback, this));
+  PetscCall(SNESSetJacobian(snes_, jacobian_, jacobian_, jacobianCallback, this));
+  PetscCall(SNESSetConvergenceTest(snes_, convergenceCallback, this, nullptr));
+  // A step length of zero is never convergence: stol 0. rtol is relative to the load scale of each rod.
+  PetscCall(SNESSetTolerances(snes_, 0, 1e-6, 0, 100, PETSC_MAX_INT));
+  PetscCall(SNESSetMaxLinearSolveFailures(snes_, PETSC_MAX_INT)); // a singular Hessian is shifted by the line search
+  PetscCall(SNESGetLineSearch(snes_, &search));
+  PetscCall(SNESLineSearchSetType(search, line_search_name));
+  PetscCall(SNESGetKSP(snes_, &ksp));
+  PetscCall(KSPSetType(ksp, KSPPREONLY));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PCSetType(pc, PCCHOLESKY));
+  PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGNATURAL));
+  PetscCall(PCFactorSetZeroPivot(pc, 1e-250)); // pivots have the units of a stiffness: no absolute bound makes sense
+  PetscCall(SNESSetFromOptions(snes_));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode NewtonSolver::moveTo(Vec x) {
+  PetscObjectState state;
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectStateGet((PetscObject)x, &state));
+  if (x == iterate_vec_ && state == iterate_state_) PetscFunctionReturn(0);
+  rows_.assign(potential_->dofs().rows(), 0.0);
+  PetscCall(potential_->dofs().scatter(x, rows_));
+  potential_->moveTo(rows_);
+  energy_known_ = false;
+  iterate_vec_ = x;
+  iterate_state_ = state;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode NewtonSolver::writeIterate(Vec x) {
+  PetscScalar *values;
+  PetscFunctionBeginUser;
+  potential_->coordinates(rows_);
+  const auto &unknown = potential_->dofs().unknownOfRow();
+  PetscCall(VecGetArrayWrite(x, &values));
+  for (const RodRange &rod : potential_->elements().rods) // not the copies behind a ring: they would write twice
+    for (int r = rod.first_row; r < rod.first_row + rod.rows; ++r)
+      if (unknown[r] >= 0) values[unknown[r]] = rows_[r];
+  PetscCall(VecRestoreArrayWrite(x, &values));
+  iterate_vec_ = x;
+  PetscCall(PetscObjectStateGet((PetscObject)x, &iterate_state_));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode NewtonSolver::evaluate(Vec x, Vec f) {
+  PetscFunctionBeginUser;
+  PetscCall(moveTo(x));
+  PetscCall(PetscLogEventBegin(events().derivatives, 0, 0, 0, 0));
+  const Rows &rows = potential_->derivatives();
+  PetscCall(PetscLogEventEnd(events().derivatives, 0, 0, 0, 0));
+  PetscCall(potential_->dofs().gather(rows.gradient, f));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode NewtonSolver::assemble(Mat jacobian) {
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(events().fill, 0, 0, 0, 0));
+  PetscCall(potential_->dofs().fillMatrix(potential_->derivatives().band, jacobian));
+  PetscCall(PetscLogEventEnd(events().fill, 0, 0, 0, 0));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedReason *reason) {
+  PetscReal rtol;
+  PetscInt limit;
+  PetscFunctionBeginUser;
+  PetscCall(SNESGetTolerances(snes_, nullptr, &rtol, nullptr, &limit, nullptr));
+  report_.iterations = int(iteration);
+  const IncrementalPotential::Residual r = report_.residual = potential_->residual();
+  moving_ = potential_->remainingMotion(motion_);
+  *reason = SNES_CONVERGED_ITERATING;
+  if (!std::isfinite(r.force) || !std::isfinite(r.moment))
+    *reason = SNES_DIVERGED_FNORM_NAN;
+  else if (!moving_ && r.force <= std::max(rtol, r.force_floor) && r.moment <= std::max(rtol, r.moment_floor) &&
+           r.compatibility <= std::max(1e-4 * rtol, r.compatibility_floor))
+    *reason = SNES_CONVERGED_FNORM_RELATIVE;
+  else if (iteration >= limit)
+    *reason = SNES_DIVERGED_MAX_IT;
+  PetscFunctionReturn(0);
+}
+
+/// Negative pivots of the factored matrix; `regular` is false when the factorisation broke down. Factorisations without inertia (LU,
+/// iterative solvers) report none.
+PetscErrorCode NewtonSolver::readInertia(int *negative, bool *regular) {
+  KSP ksp;
+  PC pc;
+  Mat factor;
+  PetscBool cholesky;
+  PCFailedReason failed;
+  PetscFunctionBeginUser;
+  *negative = 0;
+  *regular = true;
+  PetscCall(SNESGetKSP(snes_, &ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PCGetFailedReason(pc, &failed));
+  *regular = failed == PC_NOERROR;
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &cholesky));
+  if (!cholesky || !*regular) PetscFunctionReturn(0);
+  PetscInt minus, zero, plus;
+  PetscCall(PCFactorGetMatrix(pc, &factor));
+  PetscCall(MatGetInertia(factor, &minus, &zero, &plus));
+  *negative = int(minus);
+  *regular = zero == 0;
+  PetscFunctionReturn(0);
+}
+
+/// Adds multiples of the metric to the Hessian until all pivots are positive, so that the step goes downhill. Starts near the last shift
+/// that was needed, so that a run of indefinite iterates costs one extra factorisation each.
+PetscErrorCode NewtonSolver::shiftUntilPositive(KSP ksp, Vec f, Vec y, int negative, bool regular) {
+  PetscFunctionBeginUser;
+  const auto &unknown = potential_->dofs().unknownOfRow();
+  OwnedVec diagonal;
+  PetscScalar *values;
+  PetscCall(VecDuplicate(f, diagonal.out()));
+  if (shift_ == 0) { // the slowest bending wave of the stiffest rod, EI/(rho L^4), or the edge's own axial one for a cable
+    const Scene &scene = potential_->scene();
+    for (const Rod &rod : scene.rods) {
+      double length = 0;
+      for (int i = 0; i < rod.edges(); ++i) length += rod.edge(i).norm();
+      const Material &m = rod.material;
+      const double stiffness = m.isCable() ? 1e-6 * m.axial_stiffness : 10 * std::max(m.flexural_stiffness[0], m.flexural_stiffness[1]) / (length * length);
+      shift_ = std::max(shift_, stiffness / (m.linear_density * length * length));
+    }
+  } else
+    shift_ *= 0.25;
+  double previous = 0;
+  for (int attempt = 0; attempt < 40 && (negative > 0 || !regular); ++attempt) {
+    PetscCall(VecSet(diagonal, 0));
+    PetscCall(VecGetArrayWrite(diagonal, &values));
+    for (std::size_t r = 0; r < metric_.size(); ++r)
+      if (metric_[r] > 0 && unknown[r] >= 0) values[unknown[r]] = (shift_ - previous) * metric_[r];
+    PetscCall(VecRestoreArrayWrite(diagonal, &values));
+    PetscCall(MatDiagonalSet(jacobian_, diagonal, ADD_VALUES));
+    previous = shift_;
+    PetscCall(KSPSetOperators(ksp, jacobian_, jacobian_));
+    PetscCall(KSPSolve(ksp, f, y));
+    PetscCall(readInertia(&negative, &regular));
+    ++report_.shifts;
+    if (negative > 0 || !regular) shift_ *= 8;
+  }
+  PetscFunctionReturn(0);
+}
+
+/// Newton direction for supports that still have to move: solves again with their increments on the right-hand side.
+PetscErrorCode NewtonSolver::includeMotion(KSP ksp, Vec f, Vec y) {
+  PetscFunctionBeginUser;
+  const Rows &rows = potential_->derivatives();
+  const int band = DofMap::band;
+  std::vector<double> right = rows.gradient;
+  for (std::size_t r = 0; r + band <= right.size(); ++r)
+    for (int k = 0; k < band; ++k) {
+      const double h = rows.band[r * band + k];
+      right[r] += h * motion_[r + k];
+      if (k > 0) right[r + k] += h * motion_[r];
+    }
+  OwnedVec full;
+  PetscCall(VecDuplicate(f, full.out()));
+  PetscCall(potential_->dofs().gather(right, full));
+  PetscCall(KSPSolve(ksp, full, y));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
+  constexpr double sufficient = 1e-4;
+  constexpr int most_trials = 40;
+  Vec x, f, y;
+  KSP ksp;
+  PetscFunctionBeginUser;
+  PetscCall(SNESLineSearchGetVecs(search, &x, &f, &y, nullptr, nullptr));
+  PetscCall(SNESLineSearchSetReason(search, SNES_LINESEARCH_SUCCEEDED));
+  PetscCall(SNESGetKSP(snes_, &ksp));
+  PetscCall(moveTo(x));
+  bool regular;
+  PetscCall(readInertia(&report_.negative_pivots, &regular));
+  if (report_.negative_pivots > 0 || !regular) PetscCall(shiftUntilPositive(ksp, f, y, report_.negative_pivots, regular));
+  if (moving_) PetscCall(includeMotion(ksp, f, y));
+
+  increment_.assign(potential_->dofs().rows(), 0.0);
+  PetscCall(potential_->dofs().scatter(y, increment_));
+  for (double &d : increment_) d = -d;
+  const double slope = dot(potential_->derivatives().gradient, increment_);
+  if (moving_)
+    for (std::size_t k = 0; k < increment_.size(); ++k) increment_[k] += motion_[k];
+
+  PetscCall(PetscLogEventBegin(events().line_search, 0, 0, 0, 0));
+  if (!energy_known_) energy_ = potential_->energy(potential_->iterate());
+  const double noise = potential_->energyNoise(potential_->iterate());
+  double lambda = 1;
+  bool accepted = false;
+  for (int trial = 0; trial < most_trials && !accepted; ++trial) {
+    ++report_.trials;
+    const bool possible = potential_->tryMove(increment_, lambda, trial_);
+    const double energy = possible ? potential_->energy(trial_) : HUGE_VAL;
+    // Supports that move do work: the energy may rise with them, and only has to be finite.
+    accepted = std::isfinite(energy) && (moving_ || energy <= energy_ + sufficient * lambda * slope + noise);
+    if (accepted) {
+      energy_ = energy;
+      break;
+    }
+    // Minimum of the parabola through both energies and the slope, kept within a tenth and a half.
+    const double curvature = energy - energy_ - lambda * slope;
+    const double best = std::isfinite(energy) && curvature > 0 ? -slope * lambda * lambda / (2 * curvature) : 0.5 * lambda;
+    lambda = std::clamp(best, 0.1 * lambda, 0.5 * lambda);
+  }
+  PetscCall(PetscLogEventEnd(events().line_search, 0, 0, 0, 0));
+  PetscCall(SNESLineSearchSetLambda(search, lambda));
+  if (!accepted || !std::isfinite(slope)) {
+    PetscCall(SNESLineSearchSetReason(search, SNES_LINESEARCH_FAILED_REDUCT));
+    PetscFunctionReturn(0);
+  }
+  potential_->accept(trial_);
+  energy_known_ = potential_->scene().moments.empty(); // the work of couples is counted from the iterate
+  PetscCall(writeIterate(x));
+  PetscCall(SNESComputeFunction(snes_, x, f));
+  PetscReal xnorm, fnorm, ynorm;
+  PetscCall(VecNorm(x, NORM_2, &xnorm));
+  PetscCall(VecNorm(f, NORM_2, &fnorm));
+  PetscCall(VecNorm(y, NORM_2, &ynorm));
+  PetscCall(SNESLineSearchSetNorms(search, xnorm, fnorm, ynorm));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode NewtonSolver::inertiaAtIterate(int *negative) {
+  KSP ksp;
+  bool regular;
+  PetscFunctionBeginUser;
+  PetscCall(SNESGetKSP(snes_, &ksp));
+  PetscCall(assemble(jacobian_));
+  PetscCall(KSPSetOperators(ksp, jacobian_, jacobian_));
+  PetscCall(KSPSetUp(ksp));
+  PetscCall(readInertia(negative, &regular));
+  if (!regular) *negative = -1;
+  PetscFunctionReturn(0);
+}
+
+/// Leaves a saddle: a few inverse iterations with the shifted Hessian give a direction of negative curvature, along which the energy falls on
+/// either side; the side and the length come from trials of growing size.
+PetscErrorCode NewtonSolver::escapeSaddle(bool *left) {
+  KSP ksp;
+  PetscFunctionBeginUser;
+  *left = false;
+  PetscCall(SNESGetKSP(snes_, &ksp));
+  OwnedVec right, direction;
+  PetscCall(VecDuplicate(f_, right.out()));
+  PetscCall(VecDuplicate(f_, direction.out()));
+  const auto &unknown = potential_->dofs().unknownOfRow();
+  // A fixed, broadband start: the same on every machine and orthogonal to no mode of interest.
+  rows_.assign(potential_->dofs().rows(), 0.0);
+  for (std::size_t r = 0; r < metric_.size(); ++r) rows_[r] = metric_[r] * (1 + 0.5 * std::sin(1.7 * double(r)));
+  const PetscInt n = potential_->dofs().unknowns();
+  PetscScalar *values;
+  PetscCall(VecGetArrayWrite(right, &values));
+  std::fill(values, values + n, 0.0);
+  for (std::size_t r = 0; r < metric_.size(); ++r)
+    if (unknown[r] >= 0 && metric_[r] > 0) values[unknown[r]] = rows_[r];
+  PetscCall(VecRestoreArrayWrite(right, &values));
+  PetscCall(shiftUntilPositive(ksp, right, direction, 1, true));
+  for (int k = 0; k < 6; ++k) {
+    rows_.assign(potential_->dofs().rows(), 0.0);
+    PetscCall(potential_->dofs().scatter(direction, rows_));
+    double norm = 0;
+    for (std::size_t r = 0; r < metric_.size(); ++r) norm += metric_[r] * rows_[r] * rows_[r];
+    norm = std::sqrt(norm);
+    PetscCall(VecGetArrayWrite(right, &values));
+    for (std::size_t r = 0; r < metric_.size(); ++r)
+      if (unknown[r] >= 0 && metric_[r] > 0) values[unknown[r]] = metric_[r] * rows_[r] / norm;
+    PetscCall(VecRestoreArrayWrite(right, &values));
+    PetscCall(KSPSolve(ksp, right, direction));
+  }
+  increment_.assign(potential_->dofs().rows(), 0.0);
+  PetscCall(potential_->dofs().scatter(direction, increment_));
+  // One unit: the largest edge turns by one radian.
+  double turning = 0;
+  const Elements &e = potential_->elements();
+  for (std::size_t r = 0; r < e.rods.size(); ++r)
+    for (int i = e.rods[r].first_edge; i < e.rods[r].first_edge + e.rods[r].edges; ++i) {
+      const int row = e.edge_row[i];
+      for (int a = 0; a < 3; ++a)
+        turning = std::max(turning, std::abs(increment_[row + e.rods[r].stride + a] - increment_[row + a]) * e.inverse_rest_length[i]);
+      if (e.rods[r].stride == 4) turning = std::max(turning, std::abs(increment_[row + 3]));
+    }
+  if (turning == 0) PetscFunctionReturn(0);
+  for (double &d : increment_) d /= turning;
+  const double start = potential_->energy(potential_->iterate());
+  double best = start, best_scale = 0;
+  for (double scale = 1e-3; scale < 1; scale *= 2)
+    for (const double s : {scale, -scale}) {
+      if (!potential_->tryMove(increment_, s, trial_)) continue;
+      const double energy = potential_->energy(trial_);
+      if (energy < best) {
+        best = energy;
+        best_scale = s;
+      }
+    }
+  if (best_scale == 0 || !potential_->tryMove(increment_, best_scale, trial_)) PetscFunctionReturn(0);
+  potential_->accept(trial_);
+  energy_known_ = false;
+  *left = true;
+  ++report_.escapes;
+  PetscFunctionReturn(0);
+}
+
+/// SNES from the potential's iterate. `failure` is null when it converged.
+PetscErrorCode NewtonSolver::newton(const char **failure) {
+  SNESConvergedReason reason;
+  PetscFunctionBeginUser;
+  PetscCall(writeIterate(x_));
+  const int before = report_.iterations;
+  PetscCall(SNESSolve(snes_, nullptr, x_));
+  report_.iterations += before;
+  PetscCall(SNESGetConvergedReason(snes_, &reason));
+  *failure = nullptr;
+  if (reason > 0) PetscFunctionReturn(0);
+  switch (reason) {
+  case SNES_DIVERGED_MAX_IT:
+    *failure = "the iteration limit (-snes_max_it) was reached";
+    break;
+  case SNES_DIVERGED_LINE_SEARCH:
+    *failure = "no step along the search direction lowers the energy";
+    break;
+  case SNES_DIVERGED_FNORM_NAN:
+  case SNES_DIVERGED_FUNCTION_DOMAIN:
+    *failure = "the forces are not finite";
+    break;
+  case SNES_DIVERGED_LINEAR_SOLVE:
+    *failure = "the linear solve failed";
+    break;
+  default:
+    *failure = SNESConvergedReasons[reason];
+  }
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode NewtonSolver::solve(const State &start, const Step &step, NewtonReport *report) {
+  const char *failure;
+  PetscFunctionBeginUser;
+  report_ = {};
+  potential_->beginStep(start, step);
+  energy_known_ = false;
+  PetscCall(newton(&failure));
+  // In statics the answer must be a minimum.
+  for (int k = 0; step.isStatic() && !failure; ++k) {
+    PetscCall(inertiaAtIterate(&report_.negative_pivots));
+    if (report_.negative_pivots == 0) break;
+    bool left = false;
+    if (report_.negative_pivots > 0 && k < 10) PetscCall(escapeSaddle(&left));
+    if (!left) {
+      failure = report_.negative_pivots < 0 ? "the Hessian is singular: some motion of the scene costs no energy"
+                                            : "the equilibrium is unstable (negative pivots) and no way down from it was found";
+      break;
+    }
+    PetscCall(newton(&failure));
+  }
+  report_.converged = !failure;
+  report_.reason = failure ? failure : "converged";
+  *report = report_;
+  PetscFunctionReturn(0);
+}
+
+} // namespace tendril

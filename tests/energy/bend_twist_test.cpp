@@ -1,0 +1,124 @@
+#include "support/random_cell.hpp"
+
+#include <gtest/gtest.h>
+
+namespace tendril::test {
+namespace {
+
+using D = Dual<cell_size>;
+
+/// The retracted frame of an edge whose ends move by u0, u1 and whose director turns by theta.
+FrameOf<D> moved(const Frame &f, const Vector3<D> &u0, const Vector3<D> &u1, const D &theta, bool free) {
+  const Vector3<D> tangent = f.tangent.cast<D>(), director = f.director.cast<D>();
+  if (!free) return {tangent, director, D(f.length)};
+  const Vector3<D> e = tangent * D(f.length) + u1 - u0;
+  const D length = sqrt(e.squaredNorm());
+  const Vector3<D> t = e / length;
+  return {t, rotateAbout<D>(transport<D>(director, tangent, t), t, theta), length};
+}
+
+template <Measure measure> D referenceEnergy(const RandomCell &c) {
+  std::array<D, cell_size> q;
+  for (int k = 0; k < cell_size; ++k) q[k] = D::variable(0.0, k);
+  const Vector3<D> u0(q[0], q[1], q[2]), u1(q[4], q[5], q[6]), u2(q[8], q[9], q[10]);
+  const FrameOf<D> f0 = moved(c.f0, u0, u1, q[3], c.cell.free[0] != 0), f1 = moved(c.f1, u1, u2, q[7], c.cell.free[1] != 0);
+  return cellEnergy<measure>(f0, f1, cast<D>(c.cell));
+}
+
+template <Measure measure> void expectDerivativesMatch(const RandomCell &c) {
+  const D reference = referenceEnergy<measure>(c);
+  CellDerivatives<double> d;
+  cellDerivatives<measure>(c.f0, c.f1, c.cell, d);
+  double gradient_error = 0, hessian_error = 0;
+  for (int r = 0, k = 0; r < cell_size; ++r) {
+    gradient_error = std::max(gradient_error, std::abs(d.gradient[r] - reference.g[r]));
+    for (int j = r; j < cell_size; ++j, ++k) hessian_error = std::max(hessian_error, std::abs(d.hessian[k] - reference.h(r, j)));
+  }
+  // 1e-10 relative: the conditioning of the fold (1 + cos 170 deg = 0.015, to the third power) times rounding stays well below it.
+  EXPECT_LT(gradient_error, 1e-10 * reference.g.cwiseAbs().maxCoeff());
+  EXPECT_LT(hessian_error, 1e-10 * reference.h.cwiseAbs().maxCoeff());
+  EXPECT_NEAR(cellEnergy<measure>(c.f0, c.f1, c.cell), reference.v, 1e-13 * std::abs(reference.v));
+}
+
+TEST(BendTwist, DerivativesMatchAutomaticDifferentiation) {
+  Random random(1);
+  for (const double fold : {0.0, 1e-6, 0.1, 1.0, 2.0, 2.5, 170.0 * pi / 180})
+    for (int repeat = 0; repeat < 20; ++repeat) {
+      RandomCell c = randomCell(random, fold);
+      expectDerivativesMatch<Measure::tan>(c);
+      expectDerivativesMatch<Measure::angle>(c);
+    }
+}
+
+TEST(BendTwist, DerivativesMatchOnTheHalfCellsOfClamps) {
+  Random random(2);
+  for (int repeat = 0; repeat < 40; ++repeat) {
+    RandomCell c = randomCell(random, 1.0);
+    const int fixed = repeat % 2;
+    c.cell.free[fixed] = 0;
+    c.cell.weight[fixed] = 0;
+    expectDerivativesMatch<Measure::tan>(c);
+    expectDerivativesMatch<Measure::angle>(c);
+  }
+}
+
+TEST(BendTwist, AngleMeasureIsSmoothThroughWholeTurns) {
+  Random random(3);
+  for (const double turns : {-3.0, -2.0, 1.0, 2.0}) {
+    RandomCell c = randomCell(random, 0.7);
+    c.cell.turns = 2 * pi * turns;
+    c.cell.sign = std::fmod(turns, 2.0) == 0 ? 1 : -1;
+    expectDerivativesMatch<Measure::angle>(c);
+  }
+  // Twisting through 180 degrees: strain on both sides of the seam differs by the step alone.
+  RandomCell c = randomCell(random, 0.3);
+  auto strainAt = [&](double angle, double turns) {
+    Frame f1 = c.f1;
+    f1.director = rotateAbout<double>(transport<double>(c.f0.director, c.f0.tangent, f1.tangent), f1.tangent, angle);
+    c.cell.turns = 2 * pi * turns;
+    c.cell.sign = turns == 0 ? 1 : -1;
+    return cellStrain<Measure::angle>(c.f0, f1, c.cell);
+  };
+  const double step = 1e-7;
+  const auto below = strainAt(pi - step, 0), above = strainAt(pi + step, 1);
+  EXPECT_NEAR(above[2] - below[2], 2 * step, 1e-14);
+  EXPECT_NEAR(above[0], below[0], 2 * step);
+  EXPECT_NEAR(above[1], below[1], 2 * step);
+}
+
+TEST(BendTwist, PackLanesEqualScalars) {
+  Random random(4);
+  std::array<RandomCell, Pack::size()> cells;
+  for (auto &c : cells) c = randomCell(random, 1.2);
+  auto gather = [&](auto member) { return Pack([&](int lane) { return member(cells[lane]); }); };
+  FrameOf<Pack> f0, f1;
+  CellOf<Pack> cell;
+  for (int k = 0; k < 3; ++k) {
+    f0.tangent[k] = gather([k](const RandomCell &c) { return c.f0.tangent[k]; });
+    f0.director[k] = gather([k](const RandomCell &c) { return c.f0.director[k]; });
+    f1.tangent[k] = gather([k](const RandomCell &c) { return c.f1.tangent[k]; });
+    f1.director[k] = gather([k](const RandomCell &c) { return c.f1.director[k]; });
+    cell.stiffness[k] = gather([k](const RandomCell &c) { return c.cell.stiffness[k]; });
+    cell.rest[k] = gather([k](const RandomCell &c) { return c.cell.rest[k]; });
+  }
+  for (int k = 0; k < 2; ++k) {
+    cell.weight[k] = gather([k](const RandomCell &c) { return c.cell.weight[k]; });
+    cell.free[k] = gather([k](const RandomCell &c) { return c.cell.free[k]; });
+  }
+  f0.length = gather([](const RandomCell &c) { return c.f0.length; });
+  f1.length = gather([](const RandomCell &c) { return c.f1.length; });
+  cell.turns = Pack(0.0);
+  cell.sign = Pack(1.0);
+  CellDerivatives<Pack> packed;
+  cellDerivatives<Measure::angle>(f0, f1, cell, packed);
+  for (std::size_t lane = 0; lane < cells.size(); ++lane) {
+    CellDerivatives<double> scalar;
+    cellDerivatives<Measure::angle>(cells[lane].f0, cells[lane].f1, cells[lane].cell, scalar);
+    double size = 0;
+    for (double v : scalar.hessian) size = std::max(size, std::abs(v));
+    for (int k = 0; k < cell_pairs; ++k) EXPECT_NEAR(double(packed.hessian[k][lane]), scalar.hessian[k], 1e-13 * size); // fused multiply-add
+  }
+}
+
+} // namespace
+} // namespace tendril::test
