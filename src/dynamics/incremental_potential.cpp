@@ -113,11 +113,30 @@ double IncrementalPotential::energy(const Configuration &configuration) const {
   return sum;
 }
 
+/// Coordinates carry an error of epsilon x reach, which is a strain of delta = epsilon reach / h in an edge of length h and an angle as large in
+/// a cell: each costs (force + stiffness delta) delta of energy. On top of it comes the rounding of the sums.
 double IncrementalPotential::energyNoise(const Configuration &configuration) const {
-  double sum = 0;
-  for (std::size_t r = 0; r < elements_.rods.size(); ++r)
-    for (const auto &term : terms_) sum += std::abs(term->energy(configuration, int(r)));
-  return 64 * epsilon * sum;
+  double noise = 0;
+  for (std::size_t r = 0; r < elements_.rods.size(); ++r) {
+    const RodRange &rod = elements_.rods[r];
+    double reach = 0;
+    for (int v = rod.first_vertex; v < rod.first_vertex + rod.vertices; ++v) reach = std::max(reach, configuration.position[v].cwiseAbs().maxCoeff());
+    for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
+      const double delta = epsilon * reach * elements_.inverse_rest_length[i];
+      const double force = axial_.stiffness[i] * std::abs(configuration.strain[i] - axial_.rest[i]);
+      noise += (force + axial_.stiffness[i] * delta) * delta * elements_.rest_length[i];
+    }
+    double bending = 0, delta = 0;
+    for (int c = elements_.rod_cells[r]; c < elements_.rod_cells[r + 1]; ++c) {
+      delta = std::max(delta, epsilon * reach / elements_.cells.length[c]);
+      bending += elements_.cells.stiffness[0][c] + elements_.cells.stiffness[1][c] + elements_.cells.stiffness[2][c];
+    }
+    for (const auto &term : terms_) {
+      const double energy = std::abs(term->energy(configuration, int(r)));
+      noise += 64 * epsilon * energy + delta * (std::sqrt(2 * energy * bending) + bending * delta);
+    }
+  }
+  return noise;
 }
 
 const Rows &IncrementalPotential::derivatives() {
@@ -138,6 +157,7 @@ const Rows &IncrementalPotential::derivatives() {
 bool IncrementalPotential::tryMove(const std::vector<double> &increment, double scale, Configuration &trial) {
   trial.position.resize(iterate_.position.size());
   trial.frame = iterate_.frame;
+  trial.strain.resize(iterate_.strain.size());
   trial.spin.resize(iterate_.spin.size());
   trial.turns = iterate_.turns;
   trial.twist = iterate_.twist;
@@ -149,13 +169,13 @@ bool IncrementalPotential::tryMove(const std::vector<double> &increment, double 
       const Frame &f = iterate_.frame[i];
       const double inverse = elements_.inverse_rest_length[i];
       if (!step_.mixed) {
-        trial.axial_force[i] = axial_.stiffness[i] * (axialStrain(trial.frame[i].length, inverse) - axial_.rest[i]);
+        trial.axial_force[i] = axial_.stiffness[i] * (trial.strain[i] - axial_.rest[i]);
         continue;
       }
       // dS = k (B d + c): the force the linearised strain asks for.
       const int row = elements_.edge_row[i];
       const Vec3 de = Eigen::Map<const Vec3>(&increment[row + rod.stride]) - Eigen::Map<const Vec3>(&increment[row]);
-      const double strain = axialStrain(f.length, inverse) + f.length * f.tangent.dot(de) * inverse * inverse;
+      const double strain = iterate_.strain[i] + f.length * f.tangent.dot(de) * inverse * inverse;
       trial.axial_force[i] = iterate_.axial_force[i] + scale * (axial_.stiffness[i] * (strain - axial_.rest[i]) - iterate_.axial_force[i]);
     }
   }
@@ -220,7 +240,7 @@ IncrementalPotential::Residual IncrementalPotential::residual() {
       }
       tension = std::max(tension, std::abs(iterate_.axial_force[e]));
       shortest = std::min(shortest, elements_.rest_length[e]);
-      const double strain = axialStrain(iterate_.frame[e].length, elements_.inverse_rest_length[e]) - axial_.rest[e];
+      const double strain = iterate_.strain[e] - axial_.rest[e];
       if (step_.mixed) result.compatibility = std::max(result.compatibility, std::abs(strain - iterate_.axial_force[e] / axial_.stiffness[e]));
     }
     // Coordinates carry an error of epsilon x reach: strains of epsilon reach/h, which the stiffnesses turn into forces and moments.

@@ -1,5 +1,7 @@
 #include "tendril/dynamics/state.hpp"
 
+#include "tendril/energy/edge.hpp"
+
 namespace tendril {
 
 State initialState(const Scene &scene, const Elements &elements) {
@@ -45,10 +47,12 @@ Configuration configurationOf(const State &state, const Scene &scene, const Elem
   const std::size_t ne = state.director.size();
   c.position = state.position;
   c.frame.resize(elements.frames);
+  c.strain.resize(ne);
   for (std::size_t i = 0; i < ne; ++i) {
     const Vec3 e = state.position[elements.vertex1[i]] - state.position[elements.vertex0[i]];
     const double length = e.norm();
     c.frame[i] = {e / length, state.director[i], length};
+    c.strain[i] = axialStrain(length, elements.inverse_rest_length[i]);
   }
   for (std::size_t s = 0; s < scene.supports.size(); ++s)
     if (elements.support_frame[s] >= 0) c.frame[elements.support_frame[s]] = supportFrame(scene.supports[s], motion_time);

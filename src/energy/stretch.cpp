@@ -15,7 +15,7 @@ public:
     const RodRange &rod = elements_.rods[r];
     double sum = 0;
     for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
-      const double s = axialStrain(configuration.frame[i].length, elements_.inverse_rest_length[i]) - law_.rest[i];
+      const double s = configuration.strain[i] - law_.rest[i];
       sum += 0.5 * law_.stiffness[i] * s * s * elements_.rest_length[i];
     }
     return sum;
@@ -26,7 +26,7 @@ public:
     for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
       const Frame &f = configuration.frame[i];
       const double inverse = elements_.inverse_rest_length[i];
-      const double primal = law_.stiffness[i] * (axialStrain(f.length, inverse) - law_.rest[i]);
+      const double primal = law_.stiffness[i] * (configuration.strain[i] - law_.rest[i]);
       const double force = mixed_ ? configuration.axial_force[i] : primal;
       const Vec3 g = stretchGradient(f, primal, inverse), e = stretchGradient(f, force, inverse);
       const Mat3 h = stretchHessian(f, law_.stiffness[i], force, inverse);
@@ -65,7 +65,7 @@ void AxialLaw::beginStep(const Scene &scene, const Elements &elements, const Con
     const RodRange &rod = elements.rods[r];
     for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
       stiffness[i] *= 1 + q;
-      rest[i] = q / (1 + q) * axialStrain(start.frame[i].length, elements.inverse_rest_length[i]);
+      rest[i] = q / (1 + q) * start.strain[i];
     }
   }
 }

@@ -1,4 +1,3 @@
-#include "tendril/energy/edge.hpp"
 #include "tendril/energy/term.hpp"
 
 #include <algorithm>
@@ -25,7 +24,7 @@ EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const St
       if (scene.rods[r].gravity) budget.gravity -= load_factor * elements.mass[v] * scene.gravity.dot(state.position[v]);
     }
     for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
-      const double s = axialStrain(c.frame[i].length, elements.inverse_rest_length[i]);
+      const double s = c.strain[i];
       budget.stretch += 0.5 * elements.axial_stiffness[i] * s * s * elements.rest_length[i];
       budget.kinetic += 0.5 * elements.twist_mass[i] * state.twist_rate[i] * state.twist_rate[i];
     }

@@ -270,7 +270,6 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   if (moving_)
     for (std::size_t k = 0; k < increment_.size(); ++k) increment_[k] += motion_[k];
 
-  PetscCall(PetscLogEventBegin(events().line_search, 0, 0, 0, 0));
   if (!energy_known_) energy_ = potential_->energy(potential_->iterate());
   const double noise = potential_->energyNoise(potential_->iterate());
   double lambda = 1;

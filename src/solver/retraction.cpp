@@ -1,5 +1,7 @@
 #include "tendril/solver/retraction.hpp"
 
+#include "tendril/energy/edge.hpp"
+
 namespace tendril {
 
 Retraction::Retraction(const Elements &elements, const DofMap &dofs) : elements_(elements) {
@@ -21,12 +23,12 @@ bool Retraction::apply(const Configuration &from, const std::vector<double> &inc
   const RodRange &rod = elements_.rods[r];
   for (int v = rod.first_vertex; v < rod.first_vertex + rod.vertices; ++v)
     to.position[v] = from.position[v] + scale * Eigen::Map<const Vec3>(&increment[elements_.vertex_row[v]]);
-  if (kind == RetractionKind::length && !restoreLengths(from, increment, scale, r, to.position)) return false;
+  if (kind == RetractionKind::length && !restoreLengths(from, r, to.position)) return false;
   return updateFrames(from, increment, scale, r, to);
 }
 
 /// Replaces the additive positions of a rod: chains where an end is free, corrections between held vertices and around rings.
-bool Retraction::restoreLengths(const Configuration &from, const std::vector<double> &increment, double scale, int r, std::vector<Vec3> &x) {
+bool Retraction::restoreLengths(const Configuration &from, int r, std::vector<Vec3> &x) {
   const RodRange &rod = elements_.rods[r];
   target_.resize(rod.edges);
   direction_.resize(rod.edges);
@@ -138,6 +140,7 @@ bool Retraction::updateFrames(const Configuration &from, const std::vector<doubl
     Vec3 director = transport<double>(f.director, f.tangent, t);
     if (angle != 0) director = rotateAbout<double>(director, t, angle);
     to.frame[i] = {t, director, length};
+    to.strain[i] = axialStrain(length, elements_.inverse_rest_length[i]);
     to.spin[i] = from.spin[i] + angle;
   }
   if (elements_.measure[r] != Measure::angle) return true;

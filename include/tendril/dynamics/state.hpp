@@ -28,6 +28,9 @@ State initialState(const Scene &scene, const Elements &elements);
 struct Configuration {
   std::vector<Vec3> position;
   std::vector<Frame> frame;        ///< of edges, then of supports
+  /// (ne) axial strain, computed once: compilers contract the formula differently from place to place, and a stiff rod turns that last bit
+  /// into forces.
+  std::vector<double> strain;
   std::vector<double> spin;        ///< (ne) turning of each director since the step began, summed over retractions [rad]
   std::vector<double> turns;       ///< as in State
   std::vector<double> twist;       ///< (cells) twist angle with whole turns, `angle` measure only [rad]

@@ -30,7 +30,7 @@ private:
   std::vector<double> target_, diagonal_, upper_, right_; ///< work space of one rod
   std::vector<Vec3> direction_;
 
-  bool restoreLengths(const Configuration &from, const std::vector<double> &increment, double scale, int rod, std::vector<Vec3> &x);
+  bool restoreLengths(const Configuration &from, int rod, std::vector<Vec3> &x);
   void projectSpan(int rod, int first, int last, std::vector<Vec3> &x);
   bool updateFrames(const Configuration &from, const std::vector<double> &increment, double scale, int rod, Configuration &to) const;
 };
