@@ -154,6 +154,20 @@ const Rows &IncrementalPotential::derivatives() {
   return rows_;
 }
 
+const std::vector<double> &IncrementalPotential::bandWithoutCompression() {
+  uncompressed_.gradient.assign(rows_.gradient.size(), 0.0);
+  uncompressed_.equilibrium.assign(rows_.gradient.size(), 0.0);
+  uncompressed_.band.assign(rows_.band.size(), 0.0);
+  for (const auto &term : terms_)
+    for (std::size_t r = 0; r < elements_.rods.size(); ++r) term->addDerivatives(iterate_, int(r), uncompressed_, Compression::dropped);
+  return uncompressed_.band;
+}
+
+void IncrementalPotential::resetAxialForces() {
+  for (std::size_t i = 0; i < iterate_.axial_force.size(); ++i) iterate_.axial_force[i] = axial_.stiffness[i] * (iterate_.strain[i] - axial_.rest[i]);
+  current_ = false;
+}
+
 bool IncrementalPotential::tryMove(const std::vector<double> &increment, double scale, Configuration &trial) {
   trial.position.resize(iterate_.position.size());
   trial.frame = iterate_.frame;

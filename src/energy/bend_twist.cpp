@@ -53,7 +53,7 @@ public:
     return elements_.measure[rod] == Measure::tan ? sum<Measure::tan>(configuration, rod) : sum<Measure::angle>(configuration, rod);
   }
 
-  void addDerivatives(const Configuration &configuration, int rod, Rows &rows) const override {
+  void addDerivatives(const Configuration &configuration, int rod, Rows &rows, Compression) const override {
     elements_.measure[rod] == Measure::tan ? assemble<Measure::tan>(configuration, rod, rows) : assemble<Measure::angle>(configuration, rod, rows);
   }
 

@@ -1,6 +1,6 @@
 #include "tendril/io/run.hpp"
 
-#include "tendril/dynamics/time_loop.hpp"
+#include "tendril/dynamics/simulation.hpp"
 #include "tendril/io/progress.hpp"
 #include "tendril/io/scene_reader.hpp"
 #include "tendril/io/yaml.hpp"
@@ -34,7 +34,6 @@ struct Options {
   std::string output_dir = "out";
   double output_interval = 0;
   std::set<std::string> fields{TrajectoryWriter::fieldNames().begin(), TrajectoryWriter::fieldNames().end()};
-  RetractionKind retraction = RetractionKind::length;
 };
 
 [[noreturn]] void failOption(const std::string &option, const std::string &message) { throw SceneError("option " + option + ": " + message); }
@@ -95,7 +94,7 @@ PetscErrorCode readOptions(Options *o) {
   const char *retractions[] = {"additive", "length"};
   choice = 1;
   PetscCall(PetscOptionsEList("-retraction", "how positions move: straight, or keeping the linearised lengths of the edges", "", retractions, 2, retractions[choice], &choice, &set));
-  o->retraction = choice == 0 ? RetractionKind::additive : RetractionKind::length;
+  o->loop.retraction = choice == 0 ? RetractionKind::additive : RetractionKind::length;
   const char *stretches[] = {"primal", "mixed"};
   choice = 1;
   PetscCall(PetscOptionsEList("-stretch", "axial force from the strain, or as an unknown of its own", "", stretches, 2, stretches[choice], &choice, &set));
@@ -208,7 +207,7 @@ void writeOptionsFile(const Options &o, const Provenance &p, const Scene &scene)
   else
     out << "load_steps: " << o.load_steps << "\n";
   out << "dt_min: " << (o.loop.dt_min > 0 ? o.loop.dt_min : o.loop.dt / 1024) << "\ngravity: [" << scene.gravity[0] << ", " << scene.gravity[1] << ", " << scene.gravity[2] << "]\noutput_dir: "
-      << o.output_dir << "\noutput_interval: " << o.output_interval << "\nretraction: " << (o.retraction == RetractionKind::length ? "length" : "additive")
+      << o.output_dir << "\noutput_interval: " << o.output_interval << "\nretraction: " << (o.loop.retraction == RetractionKind::length ? "length" : "additive")
       << "\nstretch: " << (o.loop.mixed ? "mixed" : "primal") << "\noutput_fields: [";
   for (auto f = o.fields.begin(); f != o.fields.end(); ++f) out << (f == o.fields.begin() ? "" : ", ") << *f;
   out << "]\nrods:\n";
@@ -229,30 +228,14 @@ void requireHeld(const Scene &scene) {
   }
 }
 
-/// What one run holds, in the order it is built.
-struct Run {
-  Scene scene;
-  DofMap dofs;
-  std::unique_ptr<Elements> elements;
-  std::unique_ptr<IncrementalPotential> potential;
-  NewtonSolver solver;
-  State state;
-};
-
-PetscErrorCode setUp(Run &run, Options &o) {
+PetscErrorCode setUp(Simulation &run, Options &o) {
   PetscFunctionBeginUser;
   PetscCall(PetscLogStagePush(events().setup));
   SceneFile file = readScene(o.scene, o.overrides);
-  run.scene = std::move(file.scene);
-  if (o.has_gravity) run.scene.gravity = o.gravity;
+  if (o.has_gravity) file.scene.gravity = o.gravity;
   resolve(file.run, o);
-  if (!o.loop.dynamic) requireHeld(run.scene);
-  PetscCall(run.dofs.setUp(run.scene));
-  run.elements = std::make_unique<Elements>(run.scene, run.dofs);
-  run.potential = std::make_unique<IncrementalPotential>(run.scene, run.dofs, *run.elements, o.loop.dynamic);
-  run.potential->retraction.kind = o.retraction;
-  PetscCall(run.solver.setUp(*run.potential));
-  run.state = initialState(run.scene, *run.elements);
+  if (!o.loop.dynamic) requireHeld(file.scene);
+  PetscCall(run.setUp(std::move(file.scene), o.loop));
   PetscCall(PetscLogStagePop());
   PetscFunctionReturn(0);
 }
@@ -267,7 +250,7 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
     if (help) PetscFunctionReturn(0);
     failOption("-scene", "is required: tendril -scene data/scenes/helix.yaml (-help lists all options)");
   }
-  Run run;
+  Simulation run;
   PetscCall(setUp(run, o));
   if (help) PetscFunctionReturn(0);
   PetscCall(refuseUnknownOptions());

@@ -1,5 +1,6 @@
 #include "tendril/solver/newton.hpp"
 
+#include "tendril/solver/banded.hpp"
 #include "tendril/solver/events.hpp"
 
 #include <petsc/private/linesearchimpl.h>
@@ -42,15 +43,22 @@ double dot(const std::vector<double> &a, const std::vector<double> &b) {
   return sum;
 }
 
+/// Product of a symmetric band (see DofMap::fillMatrix) with rows.
+std::vector<double> bandTimes(const std::vector<double> &band, const std::vector<double> &x) {
+  std::vector<double> y(x.size(), 0.0);
+  for (std::size_t r = 0; r + DofMap::band <= x.size(); ++r)
+    for (int k = 0; k < DofMap::band; ++k) {
+      const double h = band[r * DofMap::band + k];
+      y[r] += h * x[r + k];
+      if (k > 0) y[r + k] += h * x[r];
+    }
+  return y;
+}
+
 /// Diagonal by which an indefinite Hessian is shifted: the mass of each position, and for twists a moment of the same mass over the
 /// edge's length, so that both see curvature on the scale of an edge alike. Independent of units and of the time step.
-std::vector<double> shiftMetric(const IncrementalPotential &potential) {
-  const Elements &e = potential.elements();
-  std::vector<double> metric(potential.scene().rods.empty() ? 0 : e.vertex_row.size() * 8 + 64, 0.0);
-  metric.clear();
-  int rows = 0;
-  for (const RodRange &rod : e.rods) rows = std::max(rows, rod.first_row + rod.rows + 32);
-  metric.assign(rows, 0.0);
+std::vector<double> shiftMetric(const Elements &e, int rows) {
+  std::vector<double> metric(rows, 0.0);
   for (std::size_t v = 0; v < e.vertex_row.size(); ++v)
     for (int a = 0; a < 3; ++a) metric[e.vertex_row[v] + a] = e.mass[v];
   for (const RodRange &rod : e.rods)
@@ -65,6 +73,7 @@ std::vector<double> shiftMetric(const IncrementalPotential &potential) {
 PetscErrorCode registerSolvers() {
   PetscFunctionBeginUser;
   PetscCall(SNESLineSearchRegister(line_search_name, createLineSearch));
+  PetscCall(registerBanded());
   PetscFunctionReturn(0);
 }
 
@@ -74,8 +83,8 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential) {
   SNESLineSearch search;
   PetscFunctionBeginUser;
   potential_ = &potential;
-  metric_ = shiftMetric(potential);
   DofMap &dofs = potential.dofs();
+  metric_ = shiftMetric(potential.elements(), dofs.rows());
   PetscCall(dofs.createMatrix(jacobian_.out()));
   PetscCall(DMCreateGlobalVector(dofs.dm(), x_.out()));
   PetscCall(VecDuplicate(x_, f_.out()));
@@ -95,8 +104,9 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential) {
   PetscCall(KSPSetType(ksp, KSPPREONLY));
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(PCSetType(pc, PCCHOLESKY));
+  PetscCall(PCFactorSetMatSolverType(pc, "banded"));
   PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGNATURAL));
-  PetscCall(PCFactorSetZeroPivot(pc, 1e-250)); // pivots have the units of a stiffness: no absolute bound makes sense
+  PetscCall(PCFactorSetZeroPivot(pc, 1e-250)); // for PETSc's own: pivots have the units of a stiffness, no absolute bound makes sense
   PetscCall(SNESSetFromOptions(snes_));
   PetscFunctionReturn(0);
 }
@@ -155,6 +165,7 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
   PetscCall(SNESGetTolerances(snes_, nullptr, &rtol, nullptr, &limit, nullptr));
   report_.iterations = int(iteration);
   const IncrementalPotential::Residual r = report_.residual = potential_->residual();
+  report_.history.push_back(r.force);
   moving_ = potential_->remainingMotion(motion_);
   *reason = SNES_CONVERGED_ITERATING;
   if (!std::isfinite(r.force) || !std::isfinite(r.moment))
@@ -188,7 +199,25 @@ PetscErrorCode NewtonSolver::readInertia(int *negative, bool *regular) {
   PetscCall(PCFactorGetMatrix(pc, &factor));
   PetscCall(MatGetInertia(factor, &minus, &zero, &plus));
   *negative = int(minus);
-  *regular = zero == 0;
+  report_.neutral_pivots = int(zero);
+  PetscFunctionReturn(0);
+}
+
+/// Direction for an indefinite Hessian. First without the compression of edges, which is the usual cause; then with a shifted diagonal.
+/// Couples have no potential and no definite Hessian: for them Newton's own direction stands as long as it goes downhill.
+PetscErrorCode NewtonSolver::makeDescent(KSP ksp, Vec f, Vec y, int negative, bool regular) {
+  PetscFunctionBeginUser;
+  if (regular && !potential_->scene().moments.empty()) {
+    PetscScalar slope;
+    PetscCall(VecDot(f, y, &slope));
+    if (slope > 0) PetscFunctionReturn(0);
+  }
+  PetscCall(potential_->dofs().fillMatrix(potential_->bandWithoutCompression(), jacobian_));
+  PetscCall(KSPSetOperators(ksp, jacobian_, jacobian_));
+  PetscCall(KSPSolve(ksp, f, y));
+  PetscCall(readInertia(&negative, &regular));
+  ++report_.shifts;
+  if (negative > 0 || !regular) PetscCall(shiftUntilPositive(ksp, f, y, negative, regular));
   PetscFunctionReturn(0);
 }
 
@@ -233,14 +262,8 @@ PetscErrorCode NewtonSolver::shiftUntilPositive(KSP ksp, Vec f, Vec y, int negat
 PetscErrorCode NewtonSolver::includeMotion(KSP ksp, Vec f, Vec y) {
   PetscFunctionBeginUser;
   const Rows &rows = potential_->derivatives();
-  const int band = DofMap::band;
-  std::vector<double> right = rows.gradient;
-  for (std::size_t r = 0; r + band <= right.size(); ++r)
-    for (int k = 0; k < band; ++k) {
-      const double h = rows.band[r * band + k];
-      right[r] += h * motion_[r + k];
-      if (k > 0) right[r + k] += h * motion_[r];
-    }
+  std::vector<double> right = bandTimes(rows.band, motion_);
+  for (std::size_t r = 0; r < right.size(); ++r) right[r] += rows.gradient[r];
   OwnedVec full;
   PetscCall(VecDuplicate(f, full.out()));
   PetscCall(potential_->dofs().gather(right, full));
@@ -260,7 +283,7 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   PetscCall(moveTo(x));
   bool regular;
   PetscCall(readInertia(&report_.negative_pivots, &regular));
-  if (report_.negative_pivots > 0 || !regular) PetscCall(shiftUntilPositive(ksp, f, y, report_.negative_pivots, regular));
+  if (report_.negative_pivots > 0 || !regular) PetscCall(makeDescent(ksp, f, y, report_.negative_pivots, regular));
   if (moving_) PetscCall(includeMotion(ksp, f, y));
 
   increment_.assign(potential_->dofs().rows(), 0.0);
@@ -320,69 +343,106 @@ PetscErrorCode NewtonSolver::inertiaAtIterate(int *negative) {
   PetscFunctionReturn(0);
 }
 
-/// Leaves a saddle: a few inverse iterations with the shifted Hessian give a direction of negative curvature, along which the energy falls on
-/// either side; the side and the length come from trials of growing size.
-PetscErrorCode NewtonSolver::escapeSaddle(bool *left) {
+/// A direction of negative curvature at an unstable equilibrium, in increment_. With the Hessian K = E - G split into the part E without
+/// compression and the effect G of compression, iterating v <- E^-1 G v gives the first buckling mode, the smoothest way out. Where compression
+/// is not the cause, inverse iteration with the shifted Hessian finds the lowest mode.
+PetscErrorCode NewtonSolver::findBucklingMode(bool *found) {
   KSP ksp;
   PetscFunctionBeginUser;
-  *left = false;
   PetscCall(SNESGetKSP(snes_, &ksp));
-  OwnedVec right, direction;
-  PetscCall(VecDuplicate(f_, right.out()));
-  PetscCall(VecDuplicate(f_, direction.out()));
-  const auto &unknown = potential_->dofs().unknownOfRow();
-  // A fixed, broadband start: the same on every machine and orthogonal to no mode of interest.
-  rows_.assign(potential_->dofs().rows(), 0.0);
-  for (std::size_t r = 0; r < metric_.size(); ++r) rows_[r] = metric_[r] * (1 + 0.5 * std::sin(1.7 * double(r)));
-  const PetscInt n = potential_->dofs().unknowns();
-  PetscScalar *values;
-  PetscCall(VecGetArrayWrite(right, &values));
-  std::fill(values, values + n, 0.0);
-  for (std::size_t r = 0; r < metric_.size(); ++r)
-    if (unknown[r] >= 0 && metric_[r] > 0) values[unknown[r]] = rows_[r];
-  PetscCall(VecRestoreArrayWrite(right, &values));
-  PetscCall(shiftUntilPositive(ksp, right, direction, 1, true));
-  for (int k = 0; k < 6; ++k) {
-    rows_.assign(potential_->dofs().rows(), 0.0);
-    PetscCall(potential_->dofs().scatter(direction, rows_));
+  const DofMap &dofs = potential_->dofs();
+  const std::vector<double> full = potential_->derivatives().band, elastic = potential_->bandWithoutCompression();
+  std::vector<double> compression(full.size()), right(dofs.rows());
+  for (std::size_t k = 0; k < full.size(); ++k) compression[k] = elastic[k] - full[k];
+  OwnedVec f, y;
+  PetscCall(VecDuplicate(f_, f.out()));
+  PetscCall(VecDuplicate(f_, y.out()));
+  // A fixed start without symmetry: the same on every machine, orthogonal to no mode of interest.
+  increment_.assign(dofs.rows(), 0.0);
+  for (std::size_t r = 0; r < increment_.size(); ++r)
+    if (dofs.unknownOfRow()[r] >= 0) increment_[r] = 1 + 0.5 * std::sin(1.7 * double(r));
+  auto normalise = [&] {
     double norm = 0;
-    for (std::size_t r = 0; r < metric_.size(); ++r) norm += metric_[r] * rows_[r] * rows_[r];
-    norm = std::sqrt(norm);
-    PetscCall(VecGetArrayWrite(right, &values));
-    for (std::size_t r = 0; r < metric_.size(); ++r)
-      if (unknown[r] >= 0 && metric_[r] > 0) values[unknown[r]] = metric_[r] * rows_[r] / norm;
-    PetscCall(VecRestoreArrayWrite(right, &values));
-    PetscCall(KSPSolve(ksp, right, direction));
+    for (std::size_t r = 0; r < metric_.size(); ++r) norm += metric_[r] * increment_[r] * increment_[r];
+    for (double &d : increment_) d /= std::sqrt(norm);
+  };
+  *found = false;
+  int negative;
+  bool regular;
+  PetscCall(potential_->dofs().fillMatrix(elastic, jacobian_));
+  PetscCall(KSPSetOperators(ksp, jacobian_, jacobian_));
+  PetscCall(KSPSetUp(ksp));
+  PetscCall(readInertia(&negative, &regular));
+  const bool buckles = regular && negative == 0;
+  if (!buckles) {
+    PetscCall(potential_->dofs().fillMatrix(full, jacobian_));
+    PetscCall(potential_->dofs().gather(increment_, f));
+    PetscCall(shiftUntilPositive(ksp, f, y, 1, true));
   }
-  increment_.assign(potential_->dofs().rows(), 0.0);
-  PetscCall(potential_->dofs().scatter(direction, increment_));
-  // One unit: the largest edge turns by one radian.
+  // With A v = b solved, v'K v = v'b - v'(A - K)v: the stiff part of A never enters, whose rounding would hide a small curvature.
+  auto softening = [&] {
+    if (buckles) return bandTimes(compression, increment_);
+    std::vector<double> y(increment_.size(), 0.0);
+    for (std::size_t r = 0; r < y.size(); ++r) y[r] = metric_[r] * increment_[r];
+    return y;
+  };
+  normalise();
+  right = softening();
+  for (int k = 0; k < 40 && !*found; ++k) {
+    PetscCall(potential_->dofs().gather(right, f));
+    PetscCall(KSPSolve(ksp, f, y));
+    increment_.assign(dofs.rows(), 0.0);
+    PetscCall(dofs.scatter(y, increment_));
+    const double work = dot(increment_, right);
+    const std::vector<double> soft = softening();
+    *found = k >= 5 && work < (buckles ? 1 : shift_) * dot(increment_, soft);
+    normalise();
+    right = softening();
+  }
+  PetscFunctionReturn(0);
+}
+
+/// Leaves a saddle along a direction of negative curvature; its side and length come from trials of growing size, with both retractions:
+/// edges that are just right must keep their lengths, edges that an unstable state holds compressed must be free to grow.
+PetscErrorCode NewtonSolver::escapeSaddle(bool *left) {
+  PetscFunctionBeginUser;
+  *left = false;
+  bool found;
+  PetscCall(findBucklingMode(&found));
+  if (!found) PetscFunctionReturn(0);
+  // One unit: the edge that turns most turns by one radian.
   double turning = 0;
   const Elements &e = potential_->elements();
-  for (std::size_t r = 0; r < e.rods.size(); ++r)
-    for (int i = e.rods[r].first_edge; i < e.rods[r].first_edge + e.rods[r].edges; ++i) {
+  for (const RodRange &rod : e.rods)
+    for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
       const int row = e.edge_row[i];
-      for (int a = 0; a < 3; ++a)
-        turning = std::max(turning, std::abs(increment_[row + e.rods[r].stride + a] - increment_[row + a]) * e.inverse_rest_length[i]);
-      if (e.rods[r].stride == 4) turning = std::max(turning, std::abs(increment_[row + 3]));
+      for (int a = 0; a < 3; ++a) turning = std::max(turning, std::abs(increment_[row + rod.stride + a] - increment_[row + a]) * e.inverse_rest_length[i]);
+      if (rod.stride == 4) turning = std::max(turning, std::abs(increment_[row + 3]));
     }
-  if (turning == 0) PetscFunctionReturn(0);
   for (double &d : increment_) d /= turning;
-  const double start = potential_->energy(potential_->iterate());
-  double best = start, best_scale = 0;
-  for (double scale = 1e-3; scale < 1; scale *= 2)
-    for (const double s : {scale, -scale}) {
-      if (!potential_->tryMove(increment_, s, trial_)) continue;
-      const double energy = potential_->energy(trial_);
-      if (energy < best) {
-        best = energy;
-        best_scale = s;
+  RetractionKind &kind = potential_->retraction.kind;
+  const RetractionKind usual = kind;
+  RetractionKind best_kind = usual;
+  double best = potential_->energy(potential_->iterate()), best_scale = 0;
+  for (const RetractionKind k : {RetractionKind::length, RetractionKind::additive}) {
+    kind = k;
+    for (double scale = 1e-3; scale < 2; scale *= 2)
+      for (const double s : {scale, -scale}) {
+        const double energy = potential_->tryMove(increment_, s, trial_) ? potential_->energy(trial_) : HUGE_VAL;
+        if (energy < best) {
+          best = energy;
+          best_scale = s;
+          best_kind = k;
+        }
       }
-    }
-  if (best_scale == 0 || !potential_->tryMove(increment_, best_scale, trial_)) PetscFunctionReturn(0);
+  }
+  kind = best_kind;
+  *left = best_scale != 0 && potential_->tryMove(increment_, best_scale, trial_);
+  kind = usual;
+  if (!*left) PetscFunctionReturn(0);
   potential_->accept(trial_);
+  potential_->resetAxialForces();
   energy_known_ = false;
-  *left = true;
   ++report_.escapes;
   PetscFunctionReturn(0);
 }
@@ -418,21 +478,22 @@ PetscErrorCode NewtonSolver::newton(const char **failure) {
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode NewtonSolver::solve(const State &start, const Step &step, NewtonReport *report) {
+PetscErrorCode NewtonSolver::solve(const State &start, const Step &step, NewtonReport *report, const std::vector<double> *guess) {
   const char *failure;
   PetscFunctionBeginUser;
   report_ = {};
   potential_->beginStep(start, step);
+  if (guess) potential_->moveTo(*guess);
   energy_known_ = false;
   PetscCall(newton(&failure));
   // In statics the answer must be a minimum.
   for (int k = 0; step.isStatic() && !failure; ++k) {
     PetscCall(inertiaAtIterate(&report_.negative_pivots));
-    if (report_.negative_pivots == 0) break;
+    if (report_.negative_pivots == 0 || (report_.negative_pivots > 0 && !potential_->scene().moments.empty())) break; // couples: no minimum to speak of
     bool left = false;
     if (report_.negative_pivots > 0 && k < 10) PetscCall(escapeSaddle(&left));
     if (!left) {
-      failure = report_.negative_pivots < 0 ? "the Hessian is singular: some motion of the scene costs no energy"
+      failure = report_.negative_pivots < 0 ? "the Hessian cannot be factored"
                                             : "the equilibrium is unstable (negative pivots) and no way down from it was found";
       break;
     }

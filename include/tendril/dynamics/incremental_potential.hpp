@@ -29,11 +29,15 @@ public:
   double energy(const Configuration &configuration) const;
   /// Gradient, equilibrium residual and Hessian band at the iterate, computed once per iterate.
   const Rows &derivatives();
+  /// Hessian band at the iterate without the part that comes from compressed edges.
+  const std::vector<double> &bandWithoutCompression();
 
   /// Trial configuration R(iterate, scale x increment) with its axial forces; false when impossible.
   bool tryMove(const std::vector<double> &increment, double scale, Configuration &trial);
   /// Makes the trial the iterate (swaps the two).
   void accept(Configuration &trial);
+  /// Axial forces of the iterate from its strains.
+  void resetAxialForces();
   /// Size of the rounding error in the energy: differences below it decide nothing [J].
   double energyNoise(const Configuration &configuration) const;
 
@@ -65,6 +69,7 @@ private:
   Configuration iterate_;
   Rows rows_;
   bool current_ = false; ///< rows_ belong to the iterate
+  Rows uncompressed_;
   std::vector<double> force_scale_, length_;
 
   void turnSupports();

@@ -13,6 +13,7 @@ struct LoopSettings {
   bool dynamic = true;
   double dt = 1e-2, dt_min = 0, t_end = 1; ///< in statics time is the load factor and ends at 1
   bool mixed = true;
+  RetractionKind retraction = RetractionKind::length;
 };
 
 /// Takes steps and tells the observer of each one accepted.

@@ -23,6 +23,9 @@ struct Rows {
   std::vector<double> gradient, equilibrium, band;
 };
 
+/// What the compression of edges adds to the Hessian: kept is exact; dropped leaves a Hessian that compression cannot make indefinite.
+enum class Compression { kept, dropped };
+
 class Term {
 public:
   virtual ~Term() = default;
@@ -33,7 +36,7 @@ public:
   /// [J], up to a constant of the step. Not finite where the configuration is impossible.
   virtual double energy(const Configuration &configuration, int rod) const = 0;
   /// Adds gradient and Hessian, pulled back by the retraction at the configuration.
-  virtual void addDerivatives(const Configuration &configuration, int rod, Rows &rows) const = 0;
+  virtual void addDerivatives(const Configuration &configuration, int rod, Rows &rows, Compression compression = Compression::kept) const = 0;
 };
 
 /// Axial force of every edge as a linear law of its strain over one step: stiffness (strain - rest), dissipation included.

@@ -15,8 +15,10 @@ struct NewtonReport {
   int trials = 0;            ///< energies evaluated by the line search
   int shifts = 0;            ///< factorisations repeated with a shifted diagonal
   int negative_pivots = 0;   ///< of the last Hessian, unshifted
+  int neutral_pivots = 0;    ///< motions that cost no energy (solver type banded)
   int escapes = 0;           ///< saddles left along a direction of negative curvature (statics)
   IncrementalPotential::Residual residual;
+  std::vector<double> history; ///< force residual, relative to the load scale, at every iterate
   std::string reason;        ///< in words
 };
 
@@ -25,7 +27,8 @@ public:
   /// Creates SNES and its parts and reads -snes_*, -ksp_*, -pc_*, -mat_* options.
   PetscErrorCode setUp(IncrementalPotential &potential);
   /// Minimises the potential of the step. The potential's iterate is the answer when `report` says converged.
-  PetscErrorCode solve(const State &start, const Step &step, NewtonReport *report);
+  /// \param guess rows of displacements and spins to start from instead of the start state
+  PetscErrorCode solve(const State &start, const Step &step, NewtonReport *report, const std::vector<double> *guess = nullptr);
   /// Factors the Hessian at the iterate and counts negative pivots.
   PetscErrorCode inertiaAtIterate(int *negative);
 
@@ -55,6 +58,8 @@ private:
   PetscErrorCode moveTo(Vec x);
   PetscErrorCode writeIterate(Vec x);
   PetscErrorCode readInertia(int *negative, bool *regular);
+  PetscErrorCode makeDescent(KSP ksp, Vec f, Vec y, int negative, bool regular);
+  PetscErrorCode findBucklingMode(bool *found);
   PetscErrorCode shiftUntilPositive(KSP ksp, Vec f, Vec y, int negative, bool regular);
   PetscErrorCode includeMotion(KSP ksp, Vec f, Vec y);
   PetscErrorCode escapeSaddle(bool *left);

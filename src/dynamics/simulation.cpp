@@ -1,0 +1,17 @@
+#include "tendril/dynamics/simulation.hpp"
+
+namespace tendril {
+
+PetscErrorCode Simulation::setUp(Scene scene_to_run, const LoopSettings &settings) {
+  PetscFunctionBeginUser;
+  scene = std::move(scene_to_run);
+  PetscCall(dofs.setUp(scene));
+  elements = std::make_unique<Elements>(scene, dofs);
+  potential = std::make_unique<IncrementalPotential>(scene, dofs, *elements, settings.dynamic);
+  potential->retraction.kind = settings.retraction;
+  PetscCall(solver.setUp(*potential));
+  state = initialState(scene, *elements);
+  PetscFunctionReturn(0);
+}
+
+} // namespace tendril

@@ -1,0 +1,240 @@
+/// Backward Euler's own sums, dissipation, convergence of Newton, independence of its path, and rejection of steps.
+#include "support/random_cell.hpp"
+#include "support/rods.hpp"
+
+namespace tendril::test {
+namespace {
+
+Scene freeScene(Rod rod) {
+  Scene scene;
+  scene.gravity = Vec3::Zero();
+  scene.rods = {std::move(rod)};
+  return scene;
+}
+
+/// A soft spring of two turns, clamped, that moves and twists a lot in a step.
+Scene springScene(int edges = 40) {
+  HelixShape h{Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY(), 0.5, 0.1, 2, 0.1, edges};
+  Rod rod;
+  rod.name = "spring";
+  rod.position = helixShape(h).points;
+  rod.material = homogeneousMaterial({SectionShape::rectangle, {0.01, 0.006}}, 1e7, 4e6, 1000);
+  setBishopDirectors(rod);
+  Scene scene = clampedScene(rod);
+  scene.gravity = Vec3(0, -9.8, 3);
+  return scene;
+}
+
+TEST(FreeFall, IsBackwardEulersOwnSum) {
+  Scene scene = freeScene(straightRod(10));
+  scene.rods[0].initial_velocity = Vec3(1, 2, 0);
+  scene.gravity = Vec3(0, -9.81, 0);
+  Simulation sim;
+  const int n = 50;
+  const double h = 0.01;
+  EXPECT_PETSC(PetscOptionsSetValue(nullptr, "-snes_rtol", "1e-11"));
+  runTo(sim, scene, dynamics(h, n * h));
+  EXPECT_PETSC(PetscOptionsClearValue(nullptr, "-snes_rtol"));
+  const Vec3 moved = Vec3(1, 2, 0) * n * h + scene.gravity * h * h * n * (n + 1) / 2;
+  for (int v = 0; v <= 10; ++v) EXPECT_LT((sim.state.position[v] - scene.rods[0].position[v] - moved).norm(), 1e-11); // 50 steps of the solver's 1e-11 of the weight
+}
+
+TEST(MassDamping, SlowsByItsOwnFactor) {
+  const double alpha = 3, h = 0.02;
+  const int n = 40;
+  Scene scene = freeScene(straightRod(8));
+  scene.rods[0].initial_velocity = Vec3(0.3, -1, 2);
+  scene.rods[0].material.mass_damping_coefficient = alpha;
+  Simulation sim;
+  runTo(sim, scene, dynamics(h, n * h));
+  for (const Vec3 &v : sim.state.velocity) EXPECT_LT((v - scene.rods[0].initial_velocity / std::pow(1 + alpha * h, n)).norm(), 1e-7);
+}
+
+TEST(StiffnessDamping, DoesNotSeeRigidMotion) {
+  Scene scene = springScene();
+  scene.supports.clear();
+  Simulation damped, plain;
+  const LoopSettings settings = dynamics(0.01, 1);
+  scene.rods[0].material.stiffness_damping_coefficient = 0.5;
+  EXPECT_PETSC(damped.setUp(scene, settings));
+  scene.rods[0].material.stiffness_damping_coefficient = 0;
+  EXPECT_PETSC(plain.setUp(scene, settings));
+  State turned = plain.state;
+  const Mat3 r = Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()).toRotationMatrix();
+  for (Vec3 &x : turned.position) x = r * x + Vec3(0.1, 0.2, 0.3);
+  for (Vec3 &d : turned.director) d = r * d;
+  Step step;
+  step.dt = 0.01;
+  step.time = 0.01;
+  damped.potential->beginStep(damped.state, step);
+  plain.potential->beginStep(plain.state, step);
+  const double a = damped.potential->energy(configurationOf(turned, damped.scene, *damped.elements, 0));
+  const double b = plain.potential->energy(configurationOf(turned, plain.scene, *plain.elements, 0));
+  EXPECT_NEAR(a, b, 1e-12 * std::abs(b));
+}
+
+TEST(StiffnessDamping, IsTheRatePotentialOfTheStoredEnergy) {
+  // E with damping - E without = beta/dt x (stored energy of the strain increments), for every strain: h R((q - q_n)/h).
+  Scene scene = springScene();
+  const LoopSettings settings = dynamics(0.01, 1);
+  const double beta = 0.02;
+  Simulation damped, plain, increments;
+  EXPECT_PETSC(plain.setUp(scene, settings));
+  scene.rods[0].material.stiffness_damping_coefficient = beta;
+  EXPECT_PETSC(damped.setUp(scene, settings));
+  State moved = plain.state;
+  Random random(5);
+  for (Vec3 &x : moved.position) x += 2e-3 * random.vector();
+  Configuration to = configurationOf(moved, plain.scene, *plain.elements, 0);
+  for (std::size_t i = 0; i < moved.director.size(); ++i) to.frame[i].director = orthonormalised(to.frame[i].director, to.frame[i].tangent);
+  Step step;
+  step.dt = step.time = 0.01;
+  auto added = [&](const Configuration &c) { return damped.potential->energy(c) - plain.potential->energy(c); };
+  plain.potential->beginStep(plain.state, step);
+  damped.potential->beginStep(damped.state, step);
+  const Configuration from = plain.potential->iterate();
+  double expected = 0;
+  for (std::size_t i = 0; i < from.strain.size(); ++i) {
+    const double d = to.strain[i] - from.strain[i];
+    expected += 0.5 * plain.elements->axial_stiffness[i] * plain.elements->rest_length[i] * d * d;
+  }
+  for (int c = 0; c < plain.elements->cells.size(); ++c) {
+    const auto s0 = presentStrain(*plain.elements, from, 0, c), s1 = presentStrain(*plain.elements, to, 0, c);
+    for (int k = 0; k < 3; ++k) expected += 0.5 * plain.elements->cells.stiffness[k][c] * std::pow(s1[k] - s0[k], 2);
+  }
+  const double measured = added(to) - added(from);
+  EXPECT_NEAR(measured, beta / step.dt * expected, 1e-10 * std::abs(beta / step.dt * expected));
+}
+
+TEST(StiffnessDamping, LeavesStaticsUnchanged) {
+  Scene scene = springScene();
+  Simulation plain, damped;
+  runTo(plain, scene, statics());
+  scene.rods[0].material.stiffness_damping_coefficient = 1;
+  scene.rods[0].material.mass_damping_coefficient = 10;
+  runTo(damped, scene, statics());
+  for (std::size_t v = 0; v < plain.state.position.size(); ++v) EXPECT_EQ(plain.state.position[v], damped.state.position[v]);
+}
+
+/// One step of a simulation from its state.
+NewtonReport oneStep(Simulation &sim, double dt, const std::vector<double> *guess = nullptr) {
+  Step step;
+  step.dt = dt;
+  step.time = sim.state.time + dt;
+  NewtonReport report;
+  EXPECT_EQ(sim.solver.solve(sim.state, step, &report, guess), PetscErrorCode(0));
+  EXPECT_TRUE(report.converged) << report.reason;
+  return report;
+}
+
+TEST(Newton, ConvergesQuadratically) {
+  Simulation sim;
+  EXPECT_PETSC(sim.setUp(springScene(), dynamics(0.05, 1)));
+  EXPECT_PETSC(SNESSetTolerances(sim.solver.snes(), 0, 1e-11, 0, 50, PETSC_MAX_INT));
+  for (int k = 0; k < 3; ++k) {
+    oneStep(sim, 0.05);
+    sim.potential->commit(sim.state);
+  }
+  const std::vector<double> r = oneStep(sim, 0.05).history;
+  // The order over the last drop that starts inside the quadratic range and ends above rounding.
+  double best = 0;
+  for (std::size_t k = 2; k < r.size(); ++k)
+    if (r[k - 1] < 1e-2 && r[k] > 1e-13) best = std::max(best, std::log(r[k] / r[k - 1]) / std::log(r[k - 1] / r[k - 2]));
+  EXPECT_GE(best, 1.8);
+}
+
+TEST(Newton, AnswerDoesNotDependOnTheFirstGuess) {
+  Simulation sim;
+  EXPECT_PETSC(sim.setUp(springScene(), dynamics(0.02, 1)));
+  EXPECT_PETSC(SNESSetTolerances(sim.solver.snes(), 0, 1e-12, 0, 50, PETSC_MAX_INT));
+  oneStep(sim, 0.02);
+  sim.potential->commit(sim.state);
+  oneStep(sim, 0.02);
+  State plain = sim.state, guessed = sim.state;
+  sim.potential->commit(plain);
+  Random random(7);
+  std::vector<double> guess(sim.dofs.rows());
+  for (std::size_t k = 0; k < guess.size(); ++k) guess[k] = 2e-3 * random() * ((k % 4) == 3 ? 100 : 1);
+  const NewtonReport report = oneStep(sim, 0.02, &guess);
+  EXPECT_GT(report.iterations, 2);
+  sim.potential->commit(guessed);
+  double largest = 0;
+  for (std::size_t v = 0; v < plain.position.size(); ++v) largest = std::max(largest, (plain.position[v] - guessed.position[v]).norm() / 0.5);
+  for (std::size_t i = 0; i < plain.director.size(); ++i) {
+    largest = std::max(largest, (plain.director[i] - guessed.director[i]).norm());
+    largest = std::max(largest, std::abs(plain.twist_rate[i] - guessed.twist_rate[i]) / 100);
+  }
+  EXPECT_LT(largest, 1e-9);
+}
+
+TEST(Newton, HelixTakesAtMostFiveIterationsPerStep) {
+  Rod rod;
+  rod.name = "spring";
+  rod.position = helixShape({Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY(), 1.25, 0.125, 8, 0.1, 128}).points;
+  rod.material = homogeneousMaterial({SectionShape::circle, {0.01, 0}}, 1e9, 1e9, 1e3);
+  setBishopDirectors(rod);
+  for (const double factor : {1.0, 1e4}) {
+    Scene scene;
+    scene.gravity = Vec3(0, -9.8, 0);
+    scene.rods = {rod};
+    scene.rods[0].material.axial_stiffness *= factor;
+    scene.supports = {hold(scene, 0, 0, Support::Kind::pin)};
+    Simulation sim;
+    int iterations = 0;
+    runTo(sim, scene, dynamics(1.0 / 60, 1), &iterations);
+    EXPECT_LE(iterations / 60.0, 5);
+  }
+}
+
+TEST(TimeLoop, RestoresTheStateWhenAStepFails) {
+  Simulation sim;
+  LoopSettings settings = dynamics(0.05, 1);
+  EXPECT_PETSC(sim.setUp(springScene(), settings));
+  EXPECT_PETSC(SNESSetTolerances(sim.solver.snes(), 0, 1e-6, 0, 1, PETSC_MAX_INT)); // one iteration is never enough
+  settings.dt_min = 0.01;
+  const State before = sim.state;
+  TimeLoop loop(sim.solver, settings);
+  bool finished = true;
+  EXPECT_PETSC(loop.run(sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+  EXPECT_FALSE(finished);
+  EXPECT_TRUE(sim.state == before);
+  EXPECT_NE(loop.failure().find("iteration limit"), std::string::npos) << loop.failure();
+}
+
+TEST(TimeLoop, HalvesTheStepAndRecoversIt) {
+  Simulation sim;
+  LoopSettings settings = dynamics(0.2, 2);
+  EXPECT_PETSC(sim.setUp(springScene(), settings));
+  EXPECT_PETSC(SNESSetTolerances(sim.solver.snes(), 0, 1e-6, 0, 5, PETSC_MAX_INT));
+  TimeLoop loop(sim.solver, settings);
+  bool finished = false;
+  int rejected = 0;
+  double smallest = 1, last = 0;
+  EXPECT_PETSC(loop.run(
+      sim.state,
+      [&](const State &, const Diagnostics &row) {
+        rejected += row.rejected_steps;
+        smallest = std::min(smallest, row.dt);
+        last = row.dt;
+        return PetscErrorCode(0);
+      },
+      &finished));
+  EXPECT_TRUE(finished) << loop.failure();
+  EXPECT_GT(rejected, 0);
+  EXPECT_LT(smallest, 0.2);
+  EXPECT_GT(last, smallest);
+  EXPECT_DOUBLE_EQ(sim.state.time, 2);
+}
+
+TEST(Statics, CompressedColumnLeavesTheUnstableStraightState) {
+  // Clamped and free, compressed at twice the Euler load pi^2/4: the straight state is an equilibrium, but not a minimum.
+  const int n = 32;
+  Scene scene = clampedScene(straightRod(n));
+  scene.forces = {{0, n, Vec3(-2 * pi * pi / 4, 0, 0)}};
+  Simulation sim;
+  runTo(sim, scene, statics(2));
+  EXPECT_LT(sim.state.position.back().x(), 0.9);
+}
+
+} // namespace
+} // namespace tendril::test
