@@ -203,7 +203,8 @@ PetscErrorCode NewtonSolver::readInertia(int *negative, bool *regular) {
   PetscFunctionReturn(0);
 }
 
-/// Direction for an indefinite Hessian. First without the compression of edges, which is the usual cause; then with a shifted diagonal.
+/// Direction for an indefinite Hessian. A few negative pivots mean a state near a branching: a shifted diagonal keeps most of Newton's speed there.
+/// Many mean compressed edges: then their compression is left out of the Hessian, and the diagonal shifted only if that is not enough.
 /// Couples have no potential and no definite Hessian: for them Newton's own direction stands as long as it goes downhill.
 PetscErrorCode NewtonSolver::makeDescent(KSP ksp, Vec f, Vec y, int negative, bool regular) {
   PetscFunctionBeginUser;
@@ -212,11 +213,14 @@ PetscErrorCode NewtonSolver::makeDescent(KSP ksp, Vec f, Vec y, int negative, bo
     PetscCall(VecDot(f, y, &slope));
     if (slope > 0) PetscFunctionReturn(0);
   }
-  PetscCall(potential_->dofs().fillMatrix(potential_->bandWithoutCompression(), jacobian_));
-  PetscCall(KSPSetOperators(ksp, jacobian_, jacobian_));
-  PetscCall(KSPSolve(ksp, f, y));
-  PetscCall(readInertia(&negative, &regular));
-  ++report_.shifts;
+  constexpr int few = 4; // per rod: the two planes of the first two buckling modes
+  if (negative > few * int(potential_->scene().rods.size())) {
+    PetscCall(potential_->dofs().fillMatrix(potential_->bandWithoutCompression(), jacobian_));
+    PetscCall(KSPSetOperators(ksp, jacobian_, jacobian_));
+    PetscCall(KSPSolve(ksp, f, y));
+    PetscCall(readInertia(&negative, &regular));
+    ++report_.shifts;
+  }
   if (negative > 0 || !regular) PetscCall(shiftUntilPositive(ksp, f, y, negative, regular));
   PetscFunctionReturn(0);
 }
