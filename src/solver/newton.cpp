@@ -163,6 +163,7 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
   PetscInt limit;
   PetscFunctionBeginUser;
   PetscCall(SNESGetTolerances(snes_, nullptr, &rtol, nullptr, &limit, nullptr));
+  rtol *= sharpness_;
   report_.iterations = int(iteration);
   const IncrementalPotential::Residual r = report_.residual = potential_->residual();
   report_.history.push_back(r.force);
@@ -486,6 +487,7 @@ PetscErrorCode NewtonSolver::solve(const State &start, const Step &step, NewtonR
   const char *failure;
   PetscFunctionBeginUser;
   report_ = {};
+  sharpness_ = 1;
   potential_->beginStep(start, step);
   if (guess) potential_->moveTo(*guess);
   energy_known_ = false;
@@ -501,6 +503,7 @@ PetscErrorCode NewtonSolver::solve(const State &start, const Step &step, NewtonR
                                             : "the equilibrium is unstable (negative pivots) and no way down from it was found";
       break;
     }
+    sharpness_ *= 1e-2; // close to a branching the forces are small far from the equilibrium
     PetscCall(newton(&failure));
   }
   report_.converged = !failure;

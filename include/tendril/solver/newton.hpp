@@ -51,7 +51,7 @@ private:
   NewtonReport report_;
   Configuration trial_;
   std::vector<double> increment_, rows_, motion_, metric_;
-  double energy_ = 0, shift_ = 0;
+  double energy_ = 0, shift_ = 0, sharpness_ = 1;
   bool energy_known_ = false, moving_ = false;
 
   PetscErrorCode newton(const char **failure);
