@@ -1,11 +1,12 @@
 #!/usr/bin/python3
-"""What a run leaves behind: files.py <tendril> <source folder>. A killed run is readable to its last frame; ParaView's reader (VTK) sees every frame."""
+"""What a run leaves behind: files.py <tendril> <source folder>. A killed run is readable to its last frame; the XDMF file leads to every frame."""
 import os
 import signal
 import subprocess
 import sys
 import tempfile
 import time
+from xml.etree import ElementTree
 
 import h5py
 import numpy as np
@@ -49,22 +50,18 @@ with tempfile.TemporaryDirectory() as tmp:
 
     short = tmp + "/short"
     subprocess.run(run(short, "-dt", "0.01", "-t_end", "0.1"), check=True, stdout=subprocess.DEVNULL)
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-    from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
-    from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as pipeline
-
+    # Debian's VTK comes without its XDMF reader: resolve every reference of the file by hand.
     t, f = read(short + "/trajectory.h5")
-    reader = vtkXdmfReader()
-    reader.SetFileName(short + "/trajectory.xdmf")
-    reader.UpdateInformation()
-    found = reader.GetOutputInformation(0).Get(pipeline.TIME_STEPS())
-    assert found is not None and np.allclose(found, t), "the reader sees other times"
-    for k, now in enumerate(t):
-        reader.UpdateTimeStep(now)
-        data = reader.GetOutputDataObject(0)
-        while data.IsA("vtkMultiBlockDataSet"):
-            data = data.GetBlock(0)
-        assert data.GetNumberOfCells() == 1, data.GetNumberOfCells()
-        assert np.allclose(vtk_to_numpy(data.GetPoints().GetData()), f["position"][k], rtol=1e-6, atol=1e-6), "points differ"
-        assert data.GetPointData().GetArray("velocity") is not None, "no velocity"
-    print("VTK reads", len(t), "frames")
+    grids = ElementTree.parse(short + "/trajectory.xdmf").find("Domain/Grid").findall("Grid")
+    assert [float(g.find("Time").get("Value")) for g in grids] == list(t), "times differ"
+    for k, grid in enumerate(grids):
+        for item, field in ((grid.find("Geometry/DataItem"), "position"), (grid.find("Attribute[@Name='velocity']/DataItem"), "velocity")):
+            selection, data = item.findall("DataItem")
+            start, stride, count = np.array(selection.text.split(), int).reshape(3, -1)
+            name, path = data.text.split(":")
+            with h5py.File(short + "/" + name, "r", swmr=True) as h5:
+                shape = tuple(int(n) for n in data.get("Dimensions").split())
+                assert h5[path].shape == shape, (h5[path].shape, shape)
+                slab = h5[path][tuple(slice(s, s + n) for s, n in zip(start, count))]
+            assert np.array_equal(slab.reshape(f[field][k].shape), f[field][k]), f"{field} of frame {k}"
+    print("XDMF leads to", len(grids), "frames")
