@@ -298,14 +298,19 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   if (moving_)
     for (std::size_t k = 0; k < increment_.size(); ++k) increment_[k] += motion_[k];
 
+  PetscCall(PetscLogEventBegin(events().line_search, 0, 0, 0, 0));
   if (!energy_known_) energy_ = potential_->energy(potential_->iterate());
   const double noise = potential_->energyNoise(potential_->iterate());
   double lambda = 1;
   bool accepted = false;
   for (int trial = 0; trial < most_trials && !accepted; ++trial) {
     ++report_.trials;
+    PetscCall(PetscLogEventBegin(events().configuration, 0, 0, 0, 0));
     const bool possible = potential_->tryMove(increment_, lambda, trial_);
+    PetscCall(PetscLogEventEnd(events().configuration, 0, 0, 0, 0));
+    PetscCall(PetscLogEventBegin(events().energy, 0, 0, 0, 0));
     const double energy = possible ? potential_->energy(trial_) : HUGE_VAL;
+    PetscCall(PetscLogEventEnd(events().energy, 0, 0, 0, 0));
     // Supports that move do work: the energy may rise with them, and only has to be finite.
     accepted = std::isfinite(energy) && (moving_ || energy <= energy_ + sufficient * lambda * slope + noise);
     if (accepted) {

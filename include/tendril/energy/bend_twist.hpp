@@ -94,7 +94,7 @@ template <Measure measure, class T> std::array<T, 3> twistMeasure(const HalfAngl
 }
 
 /// Strains of a cell integrated over it (bending about d1 and d2, twist) [rad], before the rest strains are taken off.
-/// Seed formulas: kappa_alpha Lbar = (lbar/Lbar) kbar.e_alpha, tau Lbar = 2 tan(angle/2).
+/// kappa_alpha Lbar = (lbar/Lbar) kbar.e_alpha, tau Lbar = 2 tan(angle/2).
 template <Measure measure, class T> std::array<T, 3> cellStrain(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell) {
   const CellGeometry<T> g = cellGeometry(f0, f1, cell);
   T factor = g.stretch;

@@ -6,7 +6,7 @@
 
 namespace tendril {
 
-/// Parameters of a rod (names and defaults of the seed's RodMaterialParams, SI units).
+/// Parameters of a rod and their defaults, SI units.
 struct Material {
   double linear_density = 1e-1;                          ///< [kg/m]
   double linear_rotational_inertia = 1e-6;               ///< about the rod's axis [kg m]
