@@ -1,5 +1,6 @@
 #include "tendril/io/trajectory.hpp"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iomanip>
@@ -52,11 +53,7 @@ std::vector<double> Diagnostics::values() const {
 
 TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene, const Elements &elements, const Provenance &provenance,
                                    const std::set<std::string> &wanted)
-    : folder_(folder), vertices_(int(elements.mass.size())), edges_(int(elements.vertex0.size())), file_(Hdf5File::create(folder + "/trajectory.h5")) {
-  for (const RodRange &rod : elements.rods) {
-    rod_vertices_.push_back(rod.vertices);
-    closed_.push_back(rod.closed);
-  }
+    : folder_(folder), rods_(elements.rods.size()), vertices_(int(elements.mass.size())), edges_(int(elements.vertex0.size())), file_(Hdf5File::create(folder + "/trajectory.h5")) {
   writeHeader(scene, elements, provenance);
   file_.createGroup("state");
   for (const Field &f : fields) {
@@ -102,6 +99,15 @@ void TrajectoryWriter::writeHeader(const Scene &scene, const Elements &elements,
   file_.write("topology/rod_edge_offsets", {nr + 1}, edge_offsets.data());
   file_.write("topology/closed", {nr}, closed.data());
   file_.write("topology/edges", {hsize_t(edges_), 2}, ends.data());
+  // The rods in XDMF's code for mixed cells: 2 for a polyline, its number of points, the points; a ring ends where it began.
+  std::vector<int> polylines;
+  for (const RodRange &rod : elements.rods) {
+    polylines.insert(polylines.end(), {2, rod.vertices + (rod.closed ? 1 : 0)});
+    for (int v = 0; v < rod.vertices; ++v) polylines.push_back(rod.first_vertex + v);
+    if (rod.closed) polylines.push_back(rod.first_vertex);
+  }
+  polyline_entries_ = polylines.size();
+  file_.write("topology/polylines", {polyline_entries_}, polylines.data());
   file_.createGroup("reference");
   file_.write("reference/position", {hsize_t(vertices_), 3}, position.data());
   file_.write("reference/director", {hsize_t(edges_), 3}, director.data());
@@ -143,49 +149,53 @@ void TrajectoryWriter::writeDiagnostics(const Diagnostics &row) {
   }
 }
 
+/// The frames as slabs of the HDF5 datasets, in the form of ParaView's "XDMF Reader". Two blocks over the same points:
+/// `rods`, a polyline each, with the fields of vertices; `edges`, a segment each, with those of edges as cell data as well.
 void TrajectoryWriter::writeXdmf() const {
   const std::string path = folder_ + "/trajectory.xdmf";
   {
     std::ofstream out(path + ".part");
     out << std::setprecision(17);
     const std::size_t nt = times_.size();
-    std::size_t entries = 0;
-    for (std::size_t r = 0; r < rod_vertices_.size(); ++r) entries += std::size_t(rod_vertices_[r]) + 2 + (closed_[r] ? 1 : 0);
-    out << "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n <Domain>\n"
-        << "  <Topology TopologyType=\"Mixed\" NumberOfElements=\"" << rod_vertices_.size() << "\">\n   <DataItem Format=\"XML\" NumberType=\"Int\" Dimensions=\"" << entries << "\">\n";
-    int first = 0;
-    for (std::size_t r = 0; r < rod_vertices_.size(); ++r) {
-      const int n = rod_vertices_[r];
-      out << "    2 " << n + (closed_[r] ? 1 : 0); // 2: polyline
-      for (int v = 0; v < n; ++v) out << " " << first + v;
-      if (closed_[r]) out << " " << first;
-      out << "\n";
-      first += n;
-    }
-    out << "   </DataItem>\n  </Topology>\n  <Grid Name=\"rods\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
-    // One frame out of a dataset (nt, n[, 3]).
-    auto slab = [&](const std::string &name, int n, int components, std::size_t frame) {
-      const std::string tail = components > 1 ? " " + std::to_string(components) : "";
-      const int rank = components > 1 ? 3 : 2;
-      out << "     <DataItem ItemType=\"HyperSlab\" Dimensions=\"" << n << tail << "\" Type=\"HyperSlab\">\n      <DataItem Dimensions=\"3 " << rank
-          << "\" Format=\"XML\">" << frame << (rank == 3 ? " 0 0 1 1 1 1 " : " 0 1 1 1 ") << n << tail << "</DataItem>\n      <DataItem Dimensions=\"" << nt
-          << " " << n << tail << "\" NumberType=\"Float\" Precision=\"8\" Format=\"HDF\">trajectory.h5:/state/" << name << "</DataItem>\n     </DataItem>\n";
+    auto dataset = [&](const std::string &name, const std::string &shape, const char *type, int bytes) {
+      out << "<DataItem Dimensions=\"" << shape << "\" NumberType=\"" << type << "\" Precision=\"" << bytes << "\" Format=\"HDF\">trajectory.h5:/" << name << "</DataItem>\n";
     };
-    for (std::size_t frame = 0; frame < nt; ++frame) {
-      out << "   <Grid Name=\"frame\" GridType=\"Uniform\">\n    <Time Value=\"" << times_[frame] << "\"/>\n"
-          << "    <Topology Reference=\"/Xdmf/Domain/Topology[1]\"/>\n    <Geometry GeometryType=\"XYZ\">\n";
-      slab("position", vertices_, 3, frame);
-      out << "    </Geometry>\n";
-      for (const Field &f : fields)
-        for (const auto &[name, series] : state_) {
-          if (name != f.name || name == "position" || !f.on_vertices) continue;
-          out << "    <Attribute Name=\"" << name << "\" AttributeType=\"" << (f.components > 1 ? "Vector" : "Scalar") << "\" Center=\"Node\">\n";
-          slab(name, vertices_, int(f.components), frame);
+    // One frame out of a dataset (nt, n[, 3]). ParaView takes the first text in here as the geometry's name: it keeps what it read under that
+    // name, and complains when there is none.
+    auto frameOf = [&](const Field &f, std::size_t frame) {
+      const std::string shape = std::to_string(f.on_vertices ? vertices_ : edges_) + (f.components > 1 ? " " + std::to_string(f.components) : "");
+      out << "     <DataItem ItemType=\"HyperSlab\" Dimensions=\"" << shape << "\"><!-- frame " << frame << " --><DataItem Dimensions=\"3 " << (f.components > 1 ? 3 : 2) << "\" Format=\"XML\">" << frame
+          << (f.components > 1 ? " 0 0 1 1 1 1 " : " 0 1 1 1 ") << shape << "</DataItem>";
+      dataset(std::string("state/") + f.name, std::to_string(nt) + " " + shape, "Float", 8);
+      out << "     </DataItem>\n";
+    };
+    out << "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n <Domain>\n";
+    for (const bool edges : {false, true}) {
+      out << "  <Grid Name=\"" << (edges ? "edges" : "rods") << "\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
+      for (std::size_t frame = 0; frame < nt; ++frame) {
+        out << "   <Grid GridType=\"Uniform\">\n    <Time Value=\"" << times_[frame] << "\"/>\n    <Topology TopologyType=";
+        if (edges) {
+          out << "\"Polyline\" NodesPerElement=\"2\" NumberOfElements=\"" << edges_ << "\">";
+          dataset("topology/edges", std::to_string(edges_) + " 2", "Int", 4);
+        } else {
+          out << "\"Mixed\" NumberOfElements=\"" << rods_ << "\">";
+          dataset("topology/polylines", std::to_string(polyline_entries_), "Int", 4);
+        }
+        out << "    </Topology>\n    <Geometry GeometryType=\"XYZ\">\n";
+        frameOf(fields[0], frame);
+        out << "    </Geometry>\n";
+        for (const Field &f : fields) {
+          const bool written = std::any_of(state_.begin(), state_.end(), [&](const auto &s) { return s.first == f.name; });
+          if (&f == &fields[0] || !written || (!f.on_vertices && !edges)) continue;
+          out << "    <Attribute Name=\"" << f.name << "\" AttributeType=\"" << (f.components > 1 ? "Vector" : "Scalar") << "\" Center=\"" << (f.on_vertices ? "Node" : "Cell") << "\">\n";
+          frameOf(f, frame);
           out << "    </Attribute>\n";
         }
-      out << "   </Grid>\n";
+        out << "   </Grid>\n";
+      }
+      out << "  </Grid>\n";
     }
-    out << "  </Grid>\n </Domain>\n</Xdmf>\n";
+    out << " </Domain>\n</Xdmf>\n";
   }
   std::error_code ignored;
   std::filesystem::rename(path + ".part", path, ignored);

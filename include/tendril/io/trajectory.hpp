@@ -42,9 +42,9 @@ public:
 
 private:
   std::string folder_;
+  std::size_t rods_;
   int vertices_, edges_;
-  std::vector<int> rod_vertices_;
-  std::vector<bool> closed_;
+  hsize_t polyline_entries_ = 0;
   std::vector<double> times_;
   Hdf5File file_;
   std::vector<std::pair<std::string, std::unique_ptr<Hdf5Series>>> state_;
