@@ -169,7 +169,7 @@ void TrajectoryWriter::writeXdmf() const {
       dataset(std::string("state/") + f.name, std::to_string(nt) + " " + shape, "Float", 8);
       out << "     </DataItem>\n";
     };
-    out << "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n <Domain>\n";
+    out << "<?xml version=\"1.0\"?>\n<!-- In ParaView choose \"XDMF Reader\"; its Xdmf3 readers do not know HyperSlab. -->\n<Xdmf Version=\"3.0\">\n <Domain>\n";
     for (const bool edges : {false, true}) {
       out << "  <Grid Name=\"" << (edges ? "edges" : "rods") << "\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
       for (std::size_t frame = 0; frame < nt; ++frame) {
