@@ -26,7 +26,7 @@ Vec3 parsePoint(std::istream &in, const std::string &path, int line, const std::
     } catch (const std::exception &) {
       used = 0;
     }
-    if (used != word.size()) fail(path, line, "'" + word + "' is not a number");
+    if (used != word.size()) fail(path, line, "'" + word + "' is not a number, found in '" + text + "'");
     if (!std::isfinite(x[k])) fail(path, line, "'" + word + "' is not finite");
   }
   return x;
@@ -35,19 +35,25 @@ Vec3 parsePoint(std::istream &in, const std::string &path, int line, const std::
 std::vector<Polyline> readPoints(std::ifstream &file, const std::string &path) {
   std::vector<Polyline> lines(1);
   std::string text;
+  auto endLine = [&](int number) {
+    if (lines.back().points.size() == 1) fail(path, number, "a polyline of one point ends here; it needs at least two, and no empty line between them");
+    if (!lines.back().points.empty()) lines.emplace_back();
+  };
+  int last = 0;
   for (int number = 1; std::getline(file, text); ++number) {
     std::string clean = text.substr(0, text.find('#'));
     std::replace(clean.begin(), clean.end(), ',', ' ');
     std::istringstream in(clean);
-    std::string rest;
     if (!(in >> std::ws) || in.peek() == EOF) {
-      if (text.find('#') == std::string::npos && !lines.back().points.empty()) lines.emplace_back();
+      if (text.find('#') == std::string::npos) endLine(number);
       continue;
     }
     lines.back().points.push_back(parsePoint(in, path, number, text));
-    if (in >> rest) fail(path, number, "expected three numbers, found more in '" + text + "'");
+    if (std::string rest; in >> rest) fail(path, number, "expected three numbers, found more in '" + text + "'");
+    last = number;
   }
-  if (lines.back().points.empty()) lines.pop_back();
+  endLine(last);
+  lines.pop_back();
   return lines;
 }
 
@@ -64,11 +70,13 @@ std::vector<Polyline> readObj(std::ifstream &file, const std::string &path) {
     Polyline line;
     std::vector<int> index;
     for (std::string word; in >> word;) {
-      const int i = std::atoi(word.c_str()), count = int(vertices.size());
-      const int v = i < 0 ? count + i : i - 1;
-      if (i == 0 || v < 0 || v >= count) fail(path, number, "'" + word + "' is not one of the " + std::to_string(count) + " vertices above");
-      index.push_back(v);
+      char *end; // of the vertex's number; a texture coordinate may follow
+      const long i = std::strtol(word.c_str(), &end, 10), count = long(vertices.size());
+      const long v = i < 0 ? count + i : i - 1;
+      if ((*end != 0 && *end != '/') || i == 0 || v < 0 || v >= count) fail(path, number, "'" + word + "' is not one of the " + std::to_string(count) + " vertices above");
+      index.push_back(int(v));
     }
+    if (index.size() < 2) fail(path, number, "a line needs at least two vertices, found '" + text + "'");
     if (index.size() > 2 && index.front() == index.back()) {
       line.closed = true;
       index.pop_back();
@@ -86,9 +94,13 @@ std::vector<Polyline> readHdf5(const std::string &path) {
   std::vector<double> offsets{0, double(n)}, closed;
   if (file.has("rod_vertex_offsets")) offsets = file.read("rod_vertex_offsets", 1);
   if (file.has("closed")) closed = file.read("closed", 1);
+  bool fits = offsets.size() >= 2 && offsets.front() == 0 && offsets.back() == n;
+  for (std::size_t r = 0; r + 1 < offsets.size(); ++r) fits = fits && offsets[r + 1] == std::round(offsets[r + 1]) && offsets[r] + 2 <= offsets[r + 1];
+  if (!fits) throw SceneError(path + ": 'rod_vertex_offsets' must rise from 0 to " + std::to_string(n) + ", the number of rows of 'position', by two or more a rod");
+  if (!closed.empty() && closed.size() + 1 != offsets.size())
+    throw SceneError(path + ": 'closed' must have one number per rod (" + std::to_string(offsets.size() - 1) + "), found " + std::to_string(closed.size()));
   std::vector<Polyline> lines;
   for (std::size_t r = 0; r + 1 < offsets.size(); ++r) {
-    if (offsets[r] < 0 || offsets[r + 1] > n || offsets[r] > offsets[r + 1]) throw SceneError(path + ": 'rod_vertex_offsets' does not fit the " + std::to_string(n) + " rows of 'position'");
     Polyline line;
     for (int v = int(offsets[r]); v < int(offsets[r + 1]); ++v) line.points.emplace_back(x[3 * v], x[3 * v + 1], x[3 * v + 2]);
     line.closed = r < closed.size() && closed[r] != 0;
@@ -103,7 +115,7 @@ std::vector<Polyline> readPolylines(const std::string &path) {
   std::string extension = std::filesystem::path(path).extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(), ::tolower);
   std::ifstream file(path);
-  if (!file) throw SceneError(path + ": cannot be opened; check the path (it is relative to the scene file)");
+  if (!file || std::filesystem::is_directory(path)) throw SceneError(path + ": cannot be opened; check the path (it is relative to the scene file)");
   std::vector<Polyline> lines;
   if (extension == ".csv" || extension == ".txt")
     lines = readPoints(file, path);
@@ -113,7 +125,7 @@ std::vector<Polyline> readPolylines(const std::string &path) {
     lines = readHdf5(path);
   else
     throw SceneError(path + ": unknown kind of file '" + extension + "'; use .csv, .txt, .obj, .h5 or .hdf5");
-  if (lines.empty()) throw SceneError(path + ": holds no polyline");
+  if (lines.empty()) throw SceneError(path + ": holds no polyline" + (extension == ".obj" ? "; write one as an element 'l 1 2 3'" : ""));
   return lines;
 }
 

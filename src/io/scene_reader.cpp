@@ -19,12 +19,14 @@ public:
 
   bool has(const std::string &key) { return map_.has(key) || overrides_.count(key) > 0; }
 
-  double notNegative(const std::string &key) {
-    const YamlValue v = value(key);
-    return v.notNegative();
-  }
+  double notNegative(const std::string &key) { return value(key).notNegative(); }
   double positive(const std::string &key) { return value(key).positive(); }
-  double number(const std::string &key) { return value(key).number(); }
+  double poisson() {
+    const YamlValue v = value("poisson");
+    const double p = v.number();
+    if (p <= -1 || p > 0.5) v.fail("'poisson' must lie in (-1, 0.5], found " + v.text());
+    return p;
+  }
 
   std::array<double, 2> pair(const std::string &key) {
     const YamlValue v = value(key);
@@ -33,7 +35,7 @@ public:
       return {k, k};
     }
     const std::vector<double> list = v.numbers(2);
-    if (list[0] < 0 || list[1] < 0) v.fail("'" + key + "' must not be negative");
+    if (list[0] < 0 || list[1] < 0) v.fail("'" + key + "' must not be negative, found [" + std::to_string(list[0]) + ", " + std::to_string(list[1]) + "]");
     return {list[0], list[1]};
   }
 
@@ -47,7 +49,12 @@ private:
     map_.has(key);
     const auto found = overrides_.find(key);
     if (found == overrides_.end()) return map_.at(key);
-    return {YAML::Load(found->second), "option -rod_" + key, key};
+    const std::string option = "option -rod_" + key;
+    try {
+      return {YAML::Load(found->second), option, key};
+    } catch (const YAML::Exception &) {
+      throw SceneError(option + ": '" + found->second + "' is neither a number nor a list like [1,2]");
+    }
   }
 };
 
@@ -63,14 +70,12 @@ Material readSection(MaterialReader &in) {
   } else
     section = {SectionShape::rectangle, {in.positive("width"), in.positive("height")}};
   const double young = in.positive("young");
-  if (in.has("poisson") == in.has("shear")) in.block().fail("a homogeneous section needs 'poisson' or 'shear', not both");
+  if (in.has("poisson") == in.has("shear")) in.block().fail(std::string("a homogeneous section needs 'poisson' or 'shear', found ") + (in.has("shear") ? "both" : "none"));
   double shear;
   if (in.has("shear"))
     shear = in.positive("shear");
   else {
-    const double poisson = in.number("poisson");
-    if (poisson <= -1 || poisson > 0.5) in.block().fail("'poisson' must lie in (-1, 0.5]");
-    shear = young / (2 * (1 + poisson));
+    shear = young / (2 * (1 + in.poisson()));
   }
   return homogeneousMaterial(section, young, shear, in.positive("density"));
 }
@@ -90,6 +95,9 @@ Material readMaterial(YamlMap &map, const Overrides &overrides) {
   if (in.has("mass_damping_coefficient")) m.mass_damping_coefficient = in.notNegative("mass_damping_coefficient");
   if (in.has("stiffness_damping_coefficient")) m.stiffness_damping_coefficient = in.notNegative("stiffness_damping_coefficient");
   map.finish();
+  // Sections of 1e-100 or 1e100 m leave the range of numbers.
+  for (const double v : {m.linear_density, m.axial_stiffness, 1 + m.linear_rotational_inertia, 1 + m.torsional_stiffness, 1 + m.flexural_stiffness[0], 1 + m.flexural_stiffness[1]})
+    if (!(v > 0 && std::isfinite(v))) in.block().fail("the material's stiffness or density comes out as zero or infinite; check its numbers (SI units)");
   return m;
 }
 
@@ -119,11 +127,12 @@ std::vector<Polyline> readShape(YamlMap &rod) {
     h.origin = m.vector("origin", Vec3::Zero());
     h.axis = m.has("axis") ? unit(m.at("axis")) : Vec3::UnitX();
     h.start = m.has("start") ? unit(m.at("start")) : anyNormal(h.axis);
-    if (std::abs(h.start.dot(h.axis)) > 1e-6) m.at("start").fail("'start' must be normal to 'axis'");
+    if (std::abs(h.start.dot(h.axis)) > 1e-6) m.at("start").fail("'start' must be normal to 'axis', found a cosine of " + std::to_string(h.start.dot(h.axis)));
     h.length = m.at("length").positive();
     h.radius = m.at("radius").positive();
     h.turns = m.at("turns").number();
     h.taper = m.has("taper") ? m.at("taper").notNegative() : 0;
+    if (h.taper > 0.5) m.at("taper").fail("'taper' must be at most 0.5: it is taken off both ends");
     h.edges = m.at("edges").integer(2);
     shapes = {helixShape(h)};
     m.finish();
@@ -136,7 +145,11 @@ std::vector<Polyline> readShape(YamlMap &rod) {
   if (rod.has("file") && ++given) {
     const YamlValue v = rod.at("file");
     const std::filesystem::path path(v.text());
-    shapes = readPolylines(path.is_absolute() ? path.string() : (std::filesystem::path(v.file()).parent_path() / path).string());
+    try {
+      shapes = readPolylines(path.is_absolute() ? path.string() : (std::filesystem::path(v.file()).parent_path() / path).string());
+    } catch (const SceneError &e) {
+      v.fail(e.what());
+    }
   }
   if (given != 1) rod.value().fail("a rod needs exactly one shape: line, ring, helix, points or file; found " + std::to_string(given));
   return shapes;
@@ -164,6 +177,9 @@ void readDirectors(YamlMap &map, Rod &rod) {
   setBishopDirectors(rod, start);
 }
 
+/// Rods of one block of the scene share its name and add a number.
+bool isNamed(const Rod &rod, const std::string &name) { return rod.name == name || rod.name.rfind(name + ".", 0) == 0 || rod.name.rfind(name + "#", 0) == 0; }
+
 void readNatural(YamlMap &map, Rod &rod) {
   if (!map.has("natural")) return;
   const YamlValue v = map.at("natural");
@@ -180,9 +196,20 @@ void readNatural(YamlMap &map, Rod &rod) {
     rod.natural = Rod::Natural::given;
 }
 
+/// Name of a rod, by which supports and loads may find it without doubt.
+std::string readName(YamlMap &map, const std::vector<Rod> &rods) {
+  if (!map.has("name")) return "rod" + std::to_string(rods.size());
+  const YamlValue v = map.at("name");
+  const std::string name = v.text();
+  if (name.empty() || name == "all" || name.find_first_not_of("0123456789") == std::string::npos) v.fail("'name' must not be empty, a number or 'all', found '" + name + "'");
+  for (const Rod &rod : rods)
+    if (isNamed(rod, name)) v.fail("there is a rod '" + name + "' already; choose another 'name'");
+  return name;
+}
+
 void readRod(const YamlValue &value, const Overrides &overrides, std::vector<Rod> &rods) {
   YamlMap map(value);
-  const std::string name = map.has("name") ? map.at("name").text() : "rod" + std::to_string(rods.size());
+  const std::string name = readName(map, rods);
   const std::vector<Polyline> shapes = readShape(map);
   Rod common;
   if (map.has("material")) {
@@ -208,6 +235,11 @@ void readRod(const YamlValue &value, const Overrides &overrides, std::vector<Rod
     offset = m.at("offset").vector();
     m.finish();
   }
+  double vertices = 0;
+  for (const Polyline &shape : shapes) vertices += double(copies) * double(shape.points.size());
+  if (vertices > 1e8) value.fail("this makes " + std::to_string(std::int64_t(vertices)) + " vertices; a scene may have 1e8");
+  for (const Polyline &shape : shapes)
+    if (shape.closed && map.has("closed") && !closed) map.at("closed").fail("'closed: false' contradicts the shape, which is closed");
   for (int copy = 0; copy < copies; ++copy)
     for (std::size_t k = 0; k < shapes.size(); ++k) {
       Rod rod = common;
@@ -240,8 +272,7 @@ std::vector<int> readTargets(YamlMap &map, const std::vector<Rod> &rods) {
   const YamlValue v = map.at("rod");
   const std::string word = v.text();
   for (std::size_t r = 0; r < rods.size(); ++r) {
-    const std::string &name = rods[r].name;
-    if (word == "all" || name == word || name.rfind(word + ".", 0) == 0 || name.rfind(word + "#", 0) == 0 || std::to_string(r) == word) found.push_back(int(r));
+    if (word == "all" || isNamed(rods[r], word) || std::to_string(r) == word) found.push_back(int(r));
   }
   if (found.empty()) v.fail("there is no rod '" + word + "'; write the name of a rod, its number from 0 to " + std::to_string(rods.size() - 1) + ", or all");
   return found;
@@ -259,6 +290,7 @@ Motion readMotion(const YamlValue &value) {
   Motion m;
   m.velocity = map.vector("velocity", Vec3::Zero());
   m.angular_velocity = map.vector("angular_velocity", Vec3::Zero());
+  if (!map.has("velocity") && !map.has("angular_velocity") && !map.has("table")) value.fail("'motion' needs 'velocity' and/or 'angular_velocity', or a 'table'");
   if (map.has("table")) {
     if (map.has("velocity") || map.has("angular_velocity")) value.fail("'motion' takes a 'table' or velocities, not both");
     for (const YamlValue &row : map.at("table").items()) {
@@ -266,7 +298,7 @@ Motion readMotion(const YamlValue &value) {
       if (n != 4 && n != 7) row.fail("a row of 'table' is [time, dx, dy, dz] or [time, dx, dy, dz, rx, ry, rz]");
       const std::vector<double> v = row.numbers(n);
       m.table.push_back({v[0], Vec3(v[1], v[2], v[3]), n == 7 ? Vec3(v[4], v[5], v[6]) : Vec3(Vec3::Zero())});
-      if (m.table.size() > 1 && m.table[m.table.size() - 2].time >= v[0]) row.fail("the times of 'table' must increase");
+      if (m.table.size() > 1 && m.table[m.table.size() - 2].time >= v[0]) row.fail("the times of 'table' must increase, found " + std::to_string(v[0]) + " after " + std::to_string(m.table[m.table.size() - 2].time));
     }
     if (m.table.empty()) value.fail("'table' is empty");
   }
@@ -298,7 +330,17 @@ void readSupport(const YamlValue &value, Scene &scene) {
       }
       if (!s.frame.director.allFinite()) value.fail("'tangent' is parallel to the rod's director; give a 'director' too");
     }
-    if (map.has("motion")) s.motion = readMotion(map.at("motion"));
+    if (type == "fix_twist" && rod.material.isCable()) value.fail("rod '" + rod.name + "' has no flexural stiffness and no twist to fix");
+    if (map.has("motion")) {
+      const YamlValue motion = map.at("motion");
+      s.motion = readMotion(motion);
+      const auto turns = [](const Motion::Key &k) { return !k.rotation.isZero(0); };
+      const auto travels = [](const Motion::Key &k) { return !k.displacement.isZero(0); };
+      const auto &table = s.motion.table;
+      if (type == "pin" && (!s.motion.angular_velocity.isZero(0) || std::any_of(table.begin(), table.end(), turns))) motion.fail("a pin holds no rotation; take it away or write 'type: clamp'");
+      if (type == "fix_twist" && (!s.motion.velocity.isZero(0) || std::any_of(table.begin(), table.end(), travels)))
+        motion.fail("fix_twist holds no position; take the displacement away or add a pin that moves");
+    }
     scene.supports.push_back(s);
   }
   map.finish();
@@ -357,7 +399,11 @@ const std::vector<std::pair<std::string, std::string>> &rodOverrides() {
 SceneFile readScene(const std::string &path, const Overrides &overrides) {
   YAML::Node root;
   try {
-    root = YAML::LoadFile(path);
+    if (std::filesystem::is_directory(path)) throw SceneError(path + ": is a folder; give a scene file with -scene");
+    const std::vector<YAML::Node> documents = YAML::LoadAllFromFile(path);
+    if (documents.empty() || documents[0].IsNull()) throw SceneError(path + ":1: is empty; a scene needs at least 'rods'");
+    if (documents.size() > 1) throw SceneError(path + ":" + std::to_string(documents[1].Mark().line + 1) + ": a second document begins here; a scene is one");
+    root = documents[0];
   } catch (const YAML::BadFile &) {
     throw SceneError(path + ": cannot be opened; give an existing scene file with -scene");
   } catch (const YAML::Exception &e) {

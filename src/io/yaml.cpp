@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <sstream>
 
@@ -12,7 +13,7 @@ std::string describe(const YAML::Node &node) {
   if (node.IsNull()) return "nothing";
   if (node.IsMap()) return "a map";
   if (node.IsSequence()) return "a list of " + std::to_string(node.size());
-  return "'" + node.Scalar() + "'";
+  return "'" + node.Scalar().substr(0, 60) + "'";
 }
 
 std::string join(const std::vector<std::string> &words) {
@@ -51,7 +52,7 @@ std::string closest(const std::string &word, const std::vector<std::string> &can
 void YamlValue::fail(const std::string &message) const {
   std::ostringstream s;
   s << file_;
-  if (node_.IsDefined() && node_.Mark().line >= 0) s << ":" << node_.Mark().line + 1;
+  if (file_.rfind("option ", 0) != 0 && node_.IsDefined() && node_.Mark().line >= 0) s << ":" << node_.Mark().line + 1;
   throw SceneError(s.str() + ": " + message);
 }
 
@@ -74,10 +75,10 @@ double YamlValue::notNegative() const {
   return value;
 }
 
-int YamlValue::integer(int least) const {
+int YamlValue::integer(int least, int most) const {
   int value;
   if (!node_.IsScalar() || !YAML::convert<int>::decode(node_, value)) fail("'" + name_ + "' must be a whole number, found " + describe(node_));
-  if (value < least) fail("'" + name_ + "' must be at least " + std::to_string(least) + ", found " + describe(node_));
+  if (value < least || value > most) fail("'" + name_ + "' must be at least " + std::to_string(least) + " and at most " + std::to_string(most) + ", found " + describe(node_));
   return value;
 }
 
@@ -120,6 +121,13 @@ std::vector<YamlValue> YamlValue::items() const {
 
 YamlMap::YamlMap(const YamlValue &value) : value_(value) {
   if (!value.isMap()) value.fail("'" + value.name() + "' must be a map of keys and values, found " + describe(value.node()));
+  std::map<std::string, int> line;
+  for (const auto &entry : value.node()) {
+    const YamlValue key(entry.first, value.file(), value.name());
+    if (!key.isScalar()) key.fail("a key in '" + value.name() + "' must be a word, found " + describe(entry.first));
+    const auto [first, fresh] = line.emplace(key.text(), entry.first.Mark().line + 1);
+    if (!fresh) key.fail("the key '" + key.text() + "' stands here a second time (first in line " + std::to_string(first->second) + "); keep one of the two");
+  }
 }
 
 bool YamlMap::has(const std::string &key) {
@@ -128,7 +136,13 @@ bool YamlMap::has(const std::string &key) {
 }
 
 YamlValue YamlMap::at(const std::string &key) {
-  if (!has(key)) value_.fail("'" + value_.name() + "' needs the key '" + key + "'");
+  if (!has(key)) {
+    std::vector<std::string> others;
+    for (const auto &entry : value_.node())
+      if (!known_.count(entry.first.Scalar())) others.push_back(entry.first.Scalar());
+    const std::string near = closest(key, others);
+    value_.fail("'" + value_.name() + "' needs the key '" + key + "'" + (near.empty() ? "" : ", found '" + near + "'"));
+  }
   return {value_.node()[key], value_.file(), key};
 }
 

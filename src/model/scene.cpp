@@ -97,6 +97,8 @@ void checkRod(const Rod &rod) {
   for (int i = 0; i < rod.vertices(); ++i)
     if (!rod.position[i].allFinite()) fail("vertex ", i, " has a coordinate that is not finite");
   for (int i = 0; i < rod.edges(); ++i)
+    if (!std::isfinite(rod.edge(i).norm())) fail("edge ", i, " (vertex ", i, " to ", rod.next(i), ") is too long to compute with; SI units?");
+  for (int i = 0; i < rod.edges(); ++i)
     if (rod.edge(i).norm() <= 1e-12 * scale) fail("edge ", i, " (vertex ", i, " to ", rod.next(i), ") has zero length; remove one of the two vertices");
   for (int v = 0; v < rod.vertices(); ++v) {
     const int a = rod.edgeBefore(v), b = rod.edgeAfter(v);

@@ -1,9 +1,12 @@
 #!/usr/bin/python3
-"""Every mistake ends before the first step, with a message that names the place: bad_input.py <tendril>."""
+"""Every mistake ends before the first step, with a message that names the place: bad_input.py <tendril> [-v]; -v prints every message."""
 import os
 import subprocess
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
+
+import h5py
 
 program = os.path.abspath(sys.argv[1])
 base = """gravity: [0, -9.81, 0]
@@ -17,11 +20,60 @@ supports:
 """
 shape = "line: {from: [0, 0, 0], to: [1, 0, 0], edges: 4}"
 
+support = "  - {vertex: 0, type: clamp}"
+
+# Beside the scene of every row: files that a scene or an option may name.
+files = {
+    "file": b"",
+    "empty.yaml": b"",
+    "comment.yaml": b"# nothing but a comment\n",
+    "list.yaml": b"- a\n- b\n",
+    "two.yaml": base.encode() + b"---\nrods: []\n",
+    "binary.yaml": bytes(range(256)),
+    "latin.yaml": "n\u00e4me: 1\n".encode("latin-1"),
+    "bad.csv": b"0,0,0\n1,x,0\n",
+    "nan.csv": b"0 0 0\n1 nan 0\n",
+    "huge.csv": b"0 0 0\n1e400 0 0\n",
+    "two.csv": b"0,0,0\n1,0\n",
+    "four.csv": b"0,0,0\n1,0,0,5\n",
+    "one.csv": b"0 0 0\n1 0 0\n\n2 0 0\n\n3 0 0\n4 0 0\n",
+    "empty.csv": b"# x, y, z\n",
+    "far.csv": b"0 0 0\n1e200 0 0\n",
+    "rod.stl": b"solid\n",
+    "index.obj": b"v 0 0 0\nv 1 0 0\nl 1 3\n",
+    "word.obj": b"v 0 0 0\nv 1 0 0\nl 1 2x\n",
+    "alone.obj": b"v 0 0 0\nl 1\n",
+    "points.obj": b"v 0 0 0\nv 1 0 0\n",
+    "text.h5": b"no HDF5\n",
+}
+
+
+def writeHdf5(folder):
+    for name, datasets in (
+        ("no_position.h5", {"points": [[0.0, 0, 0], [1, 0, 0]]}),
+        ("flat.h5", {"position": [0.0, 1, 2, 3]}),
+        ("nan.h5", {"position": [[0.0, 0, 0], [1, 0, float("nan")]]}),
+        ("offsets.h5", {"position": [[0.0, 0, 0], [1, 0, 0]], "rod_vertex_offsets": [0, 5]}),
+        ("closed.h5", {"position": [[0.0, 0, 0], [1, 0, 0]], "closed": [0, 1]}),
+    ):
+        with h5py.File(f"{folder}/{name}", "w") as f:
+            for key, values in datasets.items():
+                f[key] = values
+
+
+def rod(shape_text):
+    return (shape, shape_text)
+
+
+def motion(text, kind="clamp"):
+    return (support, f"  - {{vertex: 0, type: {kind}, motion: {text}}}")
+
+
 # name, (old, new) edit of the base scene or None, options, parts of the message
 rows = [
     ("unknown key", ("gravity:", "gravitty:"), [], ["scene.yaml:1", "gravitty", "did you mean 'gravity'"]),
     ("unknown key in a rod", ("name: a", "nam: a"), [], ["scene.yaml:4", "'nam'", "name"]),
-    ("unknown key in a material", ("young", "yuong"), [], ["scene.yaml:6", "young"]),
+    ("unknown key in a material", ("young", "yuong"), [], ["scene.yaml:6", "needs the key 'young'", "found 'yuong'"]),
     ("unknown key in a support", ("type: clamp", "type: clamp, colour: red"), [], ["scene.yaml:8", "colour"]),
     ("wrong type", ("young: 1e7", "young: stiff"), [], ["scene.yaml:6", "'young' must be a number", "'stiff'"]),
     ("rubbish after a number", ("1e7", "1e7Pa"), [], ["scene.yaml:6", "1e7Pa"]),
@@ -41,7 +93,8 @@ rows = [
     ("unknown rod", ("{vertex: 0", "{rod: b, vertex: 0"), [], ["scene.yaml:8", "no rod 'b'"]),
     ("held twice", ("  - {vertex: 0, type: clamp}", "  - {vertex: 0, type: clamp}\n  - {vertex: 0, type: pin}"), [], ["scene.yaml:9", "held twice"]),
     ("no shape", (shape, "closed: false"), [], ["scene.yaml:4", "exactly one shape"]),
-    ("poisson and shear", ("poisson: 0.3", "poisson: 0.3, shear: 1e6"), [], ["scene.yaml:6", "not both"]),
+    ("poisson and shear", ("poisson: 0.3", "poisson: 0.3, shear: 1e6"), [], ["scene.yaml:6", "found both"]),
+    ("neither poisson nor shear", ("poisson: 0.3, ", ""), [], ["scene.yaml:6", "found none"]),
     ("missing polyline", (shape, "file: nowhere.csv"), [], ["nowhere.csv", "cannot be opened"]),
     ("bad polyline", (shape, "file: bad.csv"), [], ["bad.csv:2", "'x' is not a number"]),
     ("not YAML", ("rods:", "rods: ]"), [], ["scene.yaml:3", "not valid YAML"]),
@@ -57,31 +110,139 @@ rows = [
     ("unknown field", None, ["-output_fields", "colour"], ["-output_fields", "colour"]),
     ("gravity of two", None, ["-gravity", "0,1"], ["-gravity", "three numbers"]),
     ("unwritable folder", None, ["-output_dir", "file/out"], ["-output_dir", "cannot be written"]),
+    # the file as a whole
+    ("empty scene", None, ["-scene", "empty.yaml"], ["empty.yaml:1", "is empty", "rods"]),
+    ("scene of a comment", None, ["-scene", "comment.yaml"], ["comment.yaml:1", "is empty"]),
+    ("scene is a list", None, ["-scene", "list.yaml"], ["list.yaml:1", "must be a map", "a list of 2"]),
+    ("scene is a folder", None, ["-scene", "."], [".: is a folder", "-scene"]),
+    ("two documents", None, ["-scene", "two.yaml"], ["two.yaml:10", "second document"]),
+    ("binary scene", None, ["-scene", "binary.yaml"], ["binary.yaml:"]),
+    ("Latin letters", None, ["-scene", "latin.yaml"], ["latin.yaml:1"]),
+    ("key twice", ("gravity:", "gravity: [0, 0, 0]\ngravity:"), [], ["scene.yaml:2", "'gravity'", "second time", "line 1"]),
+    ("key twice in a rod", ("name: a", "name: a\n    name: b"), [], ["scene.yaml:5", "'name'", "second time"]),
+    ("tab for blanks", ("  - name", "\t- name"), [], ["scene.yaml:4", "not valid YAML"]),
+    ("unknown block", ("supports:", "contacts:"), [], ["scene.yaml:7", "contacts", "supports"]),
+    ("rods are a map", ("rods:\n  - name: a\n    " + shape, "rods: {}\nother:\n  - name: a"), [], ["scene.yaml:3", "'rods' must be a list", "a map"]),
+    ("no rods", ("rods:\n  - name: a", "more:\n  - name: a"), [], ["scene.yaml:1", "needs the key 'rods'"]),
+    ("empty list of rods", ("rods:\n  - name: a", "rods: []\nmore:\n  - name: a"), [], ["scene.yaml:3", "at least one rod"]),
+    ("rod is a word", ("supports:", "  - b\nsupports:"), [], ["scene.yaml:7", "must be a map", "'b'"]),
+    ("number for a block", ("simulation: {dt: 0.01, t_end: 0.02}", "simulation: 3"), [], ["scene.yaml:2", "'simulation' must be a map"]),
+    ("value left out", ("young: 1e7", "young:"), [], ["scene.yaml:6", "young", "nothing"]),
+    # names
+    ("name twice", ("supports:", "  - name: a\n    " + shape + "\nsupports:"), [], ["scene.yaml:7", "a rod 'a' already"]),
+    ("name is a number", ("name: a", "name: 1"), [], ["scene.yaml:4", "must not be empty, a number"]),
+    ("rod not said", ("supports:", "  - name: b\n    " + shape + "\nsupports:"), [], ["scene.yaml:10", "which 'rod'"]),
+    ("support of rod 3", (support, "  - {rod: 3, vertex: 0, type: pin}"), [], ["scene.yaml:8", "no rod '3'", "0 to 0"]),
+    # numbers
+    ("number too large to read", ("1e7", "1e400"), [], ["scene.yaml:6", "'young' must be a number", "1e400"]),
+    ("section beyond numbers", ("radius: 0.01", "radius: 1e100"), [], ["scene.yaml:6", "zero or infinite"]),
+    ("section below numbers", ("radius: 0.01", "radius: 1e-200"), [], ["scene.yaml:6", "zero or infinite"]),
+    ("point too far", rod("points: [[0, 0, 0], [1e200, 0, 0]]"), [], ["scene.yaml:4", "edge 0", "too long"]),
+    ("no edges", ("edges: 4", "edges: 0"), [], ["scene.yaml:5", "'edges' must be at least 1", "'0'"]),
+    ("half an edge", ("edges: 4", "edges: 4.5"), [], ["scene.yaml:5", "whole number", "4.5"]),
+    ("too many edges", ("edges: 4", "edges: 2000000000"), [], ["scene.yaml:5", "at most 10000000"]),
+    ("negative step in the scene", ("dt: 0.01", "dt: -0.01"), [], ["scene.yaml:2", "'dt'", "greater than zero"]),
+    ("unknown mode in the scene", ("dt: 0.01", "mode: quick, dt: 0.01"), [], ["scene.yaml:2", "dynamic, static", "quick"]),
+    ("zero radius", ("radius: 0.01", "radius: 0"), [], ["scene.yaml:6", "'radius' must be greater than zero"]),
+    ("negative bending stiffness", ("poisson: 0.3", "poisson: 0.3, flexural_stiffness: [1, -1]"), [], ["scene.yaml:6", "flexural_stiffness", "negative"]),
+    ("negative damping", ("poisson: 0.3", "poisson: 0.3, mass_damping_coefficient: -1"), [], ["scene.yaml:6", "mass_damping_coefficient", "negative"]),
+    # shapes
+    ("two shapes", rod(shape + "\n    ring: {radius: 1, edges: 8}"), [], ["scene.yaml:4", "exactly one shape", "found 2"]),
+    ("one point", rod("points: [[0, 0, 0]]"), [], ["scene.yaml:4", "1 vertices", "at least 2"]),
+    ("points in a plane", rod("points: [[0, 0], [1, 0]]"), [], ["scene.yaml:5", "list of 3 numbers", "a list of 2"]),
+    ("closed rod of two points", rod("points: [[0, 0, 0], [1, 0, 0]]\n    closed: true"), [], ["scene.yaml:4", "2 vertices", "at least 3"]),
+    ("ring repeats its first point", rod("points: [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0]]\n    closed: true"), [], ["scene.yaml:4", "edge 3", "zero length"]),
+    ("open ring", rod("ring: {radius: 1, edges: 8}\n    closed: false"), [], ["scene.yaml:6", "closed: false"]),
+    ("half a turn in a ring", rod("ring: {radius: 1, edges: 8}\n    turns: 0.5"), [], ["scene.yaml:6", "whole number"]),
+    ("ring without radius", rod("ring: {edges: 8}"), [], ["scene.yaml:5", "needs the key 'radius'"]),
+    ("helix start along its axis", rod("helix: {axis: [1, 0, 0], start: [1, 0, 0], length: 1, radius: 1, turns: 1, edges: 9}"), [], ["scene.yaml:5", "normal to 'axis'"]),
+    ("taper of both ends", rod("helix: {length: 1, radius: 1, turns: 1, taper: 0.6, edges: 9}"), [], ["scene.yaml:5", "at most 0.5"]),
+    ("axis of zero", rod("helix: {axis: [0, 0, 0], length: 1, radius: 1, turns: 1, edges: 9}"), [], ["scene.yaml:5", "'axis' must not be zero"]),
+    ("too many copies", rod(shape.replace("4", "1000") + "\n    copies: {count: 9999999, offset: [0, 0, 1]}"), [], ["scene.yaml:4", "vertices", "1e8"]),
+    ("unknown natural shape", rod(shape + "\n    natural: curly"), [], ["scene.yaml:6", "as_drawn, straight", "curly"]),
+    ("unknown measure", rod(shape + "\n    measure: sine"), [], ["scene.yaml:6", "tan, angle", "sine"]),
+    # polyline files
+    ("NaN in points", rod("file: nan.csv"), [], ["scene.yaml:5", "nan.csv:2", "not finite"]),
+    ("huge point", rod("file: huge.csv"), [], ["huge.csv:2", "1e400"]),
+    ("two numbers in a point", rod("file: two.csv"), [], ["two.csv:2", "three numbers", "'1,0'"]),
+    ("four numbers in a point", rod("file: four.csv"), [], ["four.csv:2", "three numbers"]),
+    ("polyline of one point", rod("file: one.csv"), [], ["one.csv:5", "one point"]),
+    ("no points", rod("file: empty.csv"), [], ["empty.csv", "no polyline"]),
+    ("points too far apart", rod("file: far.csv"), [], ["scene.yaml:4", "too long"]),
+    ("polyline is a folder", rod("file: ."), [], ["scene.yaml:5", "cannot be opened"]),
+    ("unknown kind of file", rod("file: rod.stl"), [], ["rod.stl", "'.stl'", ".csv"]),
+    ("vertex missing in obj", rod("file: index.obj"), [], ["index.obj:3", "'3'", "2 vertices"]),
+    ("rubbish in obj", rod("file: word.obj"), [], ["word.obj:3", "'2x'"]),
+    ("line of one vertex in obj", rod("file: alone.obj"), [], ["alone.obj:2", "two vertices"]),
+    ("obj without lines", rod("file: points.obj"), [], ["points.obj", "no polyline", "'l 1 2 3'"]),
+    ("no HDF5", rod("file: text.h5"), [], ["text.h5", "not a readable HDF5 file"]),
+    ("HDF5 without position", rod("file: no_position.h5"), [], ["no_position.h5", "no dataset 'position'"]),
+    ("HDF5 of one dimension", rod("file: flat.h5"), [], ["flat.h5", "'position'", "(n, 3)"]),
+    ("NaN in HDF5", rod("file: nan.h5"), [], ["nan.h5", "'position'", "not finite"]),
+    ("HDF5 offsets", rod("file: offsets.h5"), [], ["offsets.h5", "rise from 0 to 2"]),
+    ("HDF5 closed", rod("file: closed.h5"), [], ["closed.h5", "'closed'", "one number per rod"]),
+    # supports and loads
+    ("unknown kind of support", ("type: clamp", "type: glue"), [], ["scene.yaml:8", "clamp, pin, fix_twist", "glue"]),
+    ("support of nothing", (support, "  - {vertex: 0}"), [], ["scene.yaml:8", "needs the key 'type'"]),
+    ("tangent of a pin", (support, "  - {vertex: 0, type: pin, tangent: [1, 0, 0]}"), [], ["scene.yaml:8", "tangent"]),
+    ("director of a clamp", (support, "  - {vertex: 0, type: clamp, director: [1, 1, 0]}"), [], ["scene.yaml:8", "not normal"]),
+    ("times fall", motion("{table: [[0, 0, 0, 0], [2, 0, 0, 0], [1, 0, 0, 0]]}"), [], ["scene.yaml:8", "times", "increase"]),
+    ("short row in a table", motion("{table: [[0, 0, 0]]}"), [], ["scene.yaml:8", "[time, dx, dy, dz]"]),
+    ("empty motion", motion("{}"), [], ["scene.yaml:8", "'motion' needs"]),
+    ("table and velocity", motion("{velocity: [1, 0, 0], table: [[0, 0, 0, 0]]}"), [], ["scene.yaml:8", "not both"]),
+    ("pin turns", motion("{angular_velocity: [1, 0, 0]}", "pin"), [], ["scene.yaml:8", "no rotation"]),
+    ("fix_twist travels", motion("{velocity: [1, 0, 0]}", "fix_twist"), [], ["scene.yaml:8", "no position"]),
+    ("twist of a cable", (support, "  - {vertex: 0, type: fix_twist}"), ["-rod_flexural_stiffness", "0"], ["scene.yaml:8", "no twist to fix"]),
+    ("load of nothing", (support, support + "\nloads:\n  - {vertex: 0}"), [], ["scene.yaml:10", "'force'"]),
+    ("force on no vertex", (support, support + "\nloads:\n  - {vertex: 5, force: [0, 0, 1]}"), [], ["scene.yaml:10", "out of range"]),
+    ("torque on no edge", (support, support + "\nloads:\n  - {edge: 4, torque: 1}"), [], ["scene.yaml:10", "out of range", "0 to 3"]),
+    ("force and torque at once", (support, support + "\nloads:\n  - {vertex: 4, force: [0, 0, 1], torque: 1}"), [], ["scene.yaml:10", "torque"]),
+    # options
+    ("folder is a file", None, ["-output_dir", "file"], ["-output_dir", "'file'", "cannot be written"]),
+    ("override out of range", None, ["-rod_poisson", "0.7"], ["-rod_poisson", "(-1, 0.5]", "0.7"]),
+    ("override with an open bracket", None, ["-rod_flexural_stiffness", "[1"], ["-rod_flexural_stiffness", "'[1'"]),
+    ("override of another section", None, ["-rod_width", "1"], ["scene.yaml:6", "one of 'radius'"]),
+    ("measure of an override", None, ["-rod_measure", "sine"], ["-rod_measure", "tan, angle"]),
+    ("no scene", None, ["-scene"], ["-scene"]),
+    ("word for a number", None, ["-dt", "fast"], ["fast"]),
+    ("unknown mode", None, ["-mode", "quick"], ["-mode", "quick"]),
+    ("no load steps", None, ["-mode", "static", "-load_steps", "0"], ["-load_steps", "at least 1"]),
+    ("smallest step above the step", None, ["-dt_min", "1"], ["-dt_min", "not be larger"]),
     ("free rod in statics", ("supports:\n  - {vertex: 0, type: clamp}\n", ""), ["-mode", "static"], ["free to move"]),
 ]
 
-failures = 0
-for name, edit, options, parts in rows:
+
+
+def check(row):
+    """What is wrong with the answer to one mistake; empty when it was told well."""
+    name, edit, options, parts = row
     with tempfile.TemporaryDirectory() as tmp:
         text = base
         if edit:
             assert edit[0] in text, (name, edit[0])
             text = text.replace(edit[0], edit[1], 1)
         open(tmp + "/scene.yaml", "w").write(text)
-        open(tmp + "/bad.csv", "w").write("0,0,0\n1,x,0\n")
-        open(tmp + "/file", "w").write("")
-        command = [program]
-        if "-scene" not in options:
-            command += ["-scene", "scene.yaml"]
-        run = subprocess.run(command + options, cwd=tmp, capture_output=True, text=True)
+        for file, content in files.items():
+            open(f"{tmp}/{file}", "wb").write(content)
+        writeHdf5(tmp)
+        command = [program] if "-scene" in options else [program, "-scene", "scene.yaml"]
+        run = subprocess.run(command + options, cwd=tmp, capture_output=True, text=True, errors="replace", timeout=60)
         wrong = [p for p in parts if p not in run.stderr]
         if run.returncode != 1:
             wrong.append(f"exit code {run.returncode}")
         if any("trajectory.h5" in files for _, _, files in os.walk(tmp)):
             wrong.append("a trajectory was begun")
-        if wrong:
-            failures += 1
-            print(f"{name}: missing {wrong}\n    {run.stderr.strip()[:400]}")
+        if verbose:
+            print(f"{name}: {run.stderr.strip()}")
+        return f"{name}: missing {wrong}\n    {run.stderr.strip()[:400]}" if wrong else ""
+
+
+verbose = "-v" in sys.argv
+with ThreadPoolExecutor(4) as pool:  # a start takes longer than its work
+    complaints = [c for c in pool.map(check, rows) if c]
+failures = len(complaints)
+for complaint in complaints:
+    print(complaint)
 help_text = subprocess.run([program, "-help"], capture_output=True, text=True)
 for option in "scene mode dt dt_min t_end load_steps gravity output_dir output_interval output_fields retraction stretch rod_young rod_measure".split():
     if f"-{option}" not in help_text.stdout or help_text.returncode != 0:

@@ -24,7 +24,7 @@ public:
   double number() const;                         ///< finite
   double positive() const;                       ///< finite, > 0
   double notNegative() const;                    ///< finite, >= 0
-  int integer(int least) const;
+  int integer(int least, int most = 10'000'000) const;
   bool boolean() const;
   std::string text() const;
   Vec3 vector() const;                           ///< three finite numbers
@@ -37,7 +37,7 @@ private:
   std::string file_, name_;
 };
 
-/// A YAML map; keys that were never asked for are errors, found by finish().
+/// A YAML map. A key given twice is an error, and so are keys that were never asked for, found by finish().
 class YamlMap {
 public:
   explicit YamlMap(const YamlValue &value);

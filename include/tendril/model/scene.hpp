@@ -41,7 +41,8 @@ struct Rod {
   int edgeAfter(int vertex) const { return vertex < edges() ? vertex : -1; }
 };
 
-/// How a held thing moves: displacement and rotation vector, both from the reference, piecewise linear in time and constant velocity after.
+/// How a held thing moves: displacement and rotation vector, both from the reference, by constant velocities or by a
+/// table, linear between its rows and at rest before the first and after the last.
 struct Motion {
   struct Key {
     double time;       ///< [s]
