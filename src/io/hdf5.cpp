@@ -59,7 +59,8 @@ void Hdf5File::createGroup(const std::string &name) {
 
 void Hdf5File::write(const std::string &name, const std::vector<hsize_t> &shape, const double *values) {
   const Hdf5Space space = H5Screate_simple(int(shape.size()), shape.data(), nullptr);
-  const Hdf5Dataset data = checked(H5Dcreate2(file_, name.c_str(), H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written");
+  const Hdf5Dataset data =
+      checked(H5Dcreate2(file_, name.c_str(), H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written");
   checked(H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), path_ + ": cannot be written");
 }
 

@@ -11,9 +11,7 @@
 namespace tendril {
 namespace {
 
-[[noreturn]] void fail(const std::string &path, int line, const std::string &message) {
-  throw SceneError(path + ":" + std::to_string(line) + ": " + message);
-}
+[[noreturn]] void fail(const std::string &path, int line, const std::string &message) { throw SceneError(path + ":" + std::to_string(line) + ": " + message); }
 
 Vec3 parsePoint(std::istream &in, const std::string &path, int line, const std::string &text) {
   Vec3 x;
@@ -73,7 +71,8 @@ std::vector<Polyline> readObj(std::ifstream &file, const std::string &path) {
       char *end; // of the vertex's number; a texture coordinate may follow
       const long i = std::strtol(word.c_str(), &end, 10), count = long(vertices.size());
       const long v = i < 0 ? count + i : i - 1;
-      if ((*end != 0 && *end != '/') || i == 0 || v < 0 || v >= count) fail(path, number, "'" + word + "' is not one of the " + std::to_string(count) + " vertices above");
+      if ((*end != 0 && *end != '/') || i == 0 || v < 0 || v >= count)
+        fail(path, number, "'" + word + "' is not one of the " + std::to_string(count) + " vertices above");
       index.push_back(int(v));
     }
     if (index.size() < 2) fail(path, number, "a line needs at least two vertices, found '" + text + "'");
@@ -96,7 +95,8 @@ std::vector<Polyline> readHdf5(const std::string &path) {
   if (file.has("closed")) closed = file.read("closed", 1);
   bool fits = offsets.size() >= 2 && offsets.front() == 0 && offsets.back() == n;
   for (std::size_t r = 0; r + 1 < offsets.size(); ++r) fits = fits && offsets[r + 1] == std::round(offsets[r + 1]) && offsets[r] + 2 <= offsets[r + 1];
-  if (!fits) throw SceneError(path + ": 'rod_vertex_offsets' must rise from 0 to " + std::to_string(n) + ", the number of rows of 'position', by two or more a rod");
+  if (!fits)
+    throw SceneError(path + ": 'rod_vertex_offsets' must rise from 0 to " + std::to_string(n) + ", the number of rows of 'position', by two or more a rod");
   if (!closed.empty() && closed.size() + 1 != offsets.size())
     throw SceneError(path + ": 'closed' must have one number per rod (" + std::to_string(offsets.size() - 1) + "), found " + std::to_string(closed.size()));
   std::vector<Polyline> lines;

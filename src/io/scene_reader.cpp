@@ -10,97 +10,6 @@
 namespace tendril {
 namespace {
 
-using Overrides = std::map<std::string, std::string>;
-
-/// Values of a material block: from the file, replaced by the command line.
-class MaterialReader {
-public:
-  MaterialReader(YamlMap &map, const Overrides &overrides) : map_(map), overrides_(overrides) {}
-
-  bool has(const std::string &key) { return map_.has(key) || overrides_.count(key) > 0; }
-
-  double notNegative(const std::string &key) { return value(key).notNegative(); }
-  double positive(const std::string &key) { return value(key).positive(); }
-  double poisson() {
-    const YamlValue v = value("poisson");
-    const double p = v.number();
-    if (p <= -1 || p > 0.5) v.fail("'poisson' must lie in (-1, 0.5], found " + v.text());
-    return p;
-  }
-
-  std::array<double, 2> pair(const std::string &key) {
-    const YamlValue v = value(key);
-    if (v.isScalar()) {
-      const double k = v.notNegative();
-      return {k, k};
-    }
-    const std::vector<double> list = v.numbers(2);
-    if (list[0] < 0 || list[1] < 0) v.fail("'" + key + "' must not be negative, found [" + std::to_string(list[0]) + ", " + std::to_string(list[1]) + "]");
-    return {list[0], list[1]};
-  }
-
-  const YamlValue &block() const { return map_.value(); }
-
-private:
-  YamlMap &map_;
-  const Overrides &overrides_;
-
-  YamlValue value(const std::string &key) {
-    map_.has(key);
-    const auto found = overrides_.find(key);
-    if (found == overrides_.end()) return map_.at(key);
-    const std::string option = "option -rod_" + key;
-    try {
-      return {YAML::Load(found->second), option, key};
-    } catch (const YAML::Exception &) {
-      throw SceneError(option + ": '" + found->second + "' is neither a number nor a list like [1,2]");
-    }
-  }
-};
-
-Material readSection(MaterialReader &in) {
-  Section section{};
-  const int shapes = int(in.has("radius")) + int(in.has("radii")) + int(in.has("width") || in.has("height"));
-  if (shapes != 1) in.block().fail("a homogeneous section needs one of 'radius', 'radii: [along the first director, along the second]', or 'width' and 'height'");
-  if (in.has("radius"))
-    section = {SectionShape::circle, {in.positive("radius"), 0}};
-  else if (in.has("radii")) {
-    section = {SectionShape::ellipse, in.pair("radii")};
-    if (section.size[0] == 0 || section.size[1] == 0) in.block().fail("'radii' must be greater than zero");
-  } else
-    section = {SectionShape::rectangle, {in.positive("width"), in.positive("height")}};
-  const double young = in.positive("young");
-  if (in.has("poisson") == in.has("shear")) in.block().fail(std::string("a homogeneous section needs 'poisson' or 'shear', found ") + (in.has("shear") ? "both" : "none"));
-  double shear;
-  if (in.has("shear"))
-    shear = in.positive("shear");
-  else {
-    shear = young / (2 * (1 + in.poisson()));
-  }
-  return homogeneousMaterial(section, young, shear, in.positive("density"));
-}
-
-Material readMaterial(YamlMap &map, const Overrides &overrides) {
-  MaterialReader in(map, overrides);
-  Material m;
-  bool section = false;
-  for (const char *key : {"radius", "radii", "width", "height", "young", "poisson", "shear", "density"}) section = in.has(key) || section;
-  if (section) m = readSection(in);
-  // The stiffness parameters; beside a section they replace what follows from it.
-  if (in.has("linear_density")) m.linear_density = in.positive("linear_density");
-  if (in.has("linear_rotational_inertia")) m.linear_rotational_inertia = in.notNegative("linear_rotational_inertia");
-  if (in.has("axial_stiffness")) m.axial_stiffness = in.positive("axial_stiffness");
-  if (in.has("torsional_stiffness")) m.torsional_stiffness = in.notNegative("torsional_stiffness");
-  if (in.has("flexural_stiffness")) m.flexural_stiffness = in.pair("flexural_stiffness");
-  if (in.has("mass_damping_coefficient")) m.mass_damping_coefficient = in.notNegative("mass_damping_coefficient");
-  if (in.has("stiffness_damping_coefficient")) m.stiffness_damping_coefficient = in.notNegative("stiffness_damping_coefficient");
-  map.finish();
-  // Sections of 1e-100 or 1e100 m leave the range of numbers.
-  for (const double v : {m.linear_density, m.axial_stiffness, 1 + m.linear_rotational_inertia, 1 + m.torsional_stiffness, 1 + m.flexural_stiffness[0], 1 + m.flexural_stiffness[1]})
-    if (!(v > 0 && std::isfinite(v))) in.block().fail("the material's stiffness or density comes out as zero or infinite; check its numbers (SI units)");
-  return m;
-}
-
 Vec3 unit(const YamlValue &value) {
   const Vec3 v = value.vector();
   if (v.norm() == 0) value.fail("'" + value.name() + "' must not be zero");
@@ -118,7 +27,8 @@ std::vector<Polyline> readShape(YamlMap &rod) {
   }
   if (rod.has("ring") && ++given) {
     YamlMap m(rod.at("ring"));
-    shapes = {ringShape(m.vector("center", Vec3::Zero()), m.has("normal") ? unit(m.at("normal")) : Vec3::UnitZ(), m.at("radius").positive(), m.at("edges").integer(3))};
+    shapes = {ringShape(m.vector("center", Vec3::Zero()), m.has("normal") ? unit(m.at("normal")) : Vec3::UnitZ(), m.at("radius").positive(),
+                        m.at("edges").integer(3))};
     m.finish();
   }
   if (rod.has("helix") && ++given) {
@@ -159,10 +69,13 @@ void readDirectors(YamlMap &map, Rod &rod) {
   if (map.has("directors")) {
     const YamlValue list = map.at("directors");
     const auto items = list.items();
-    if (int(items.size()) != rod.edges()) list.fail("'directors' must have one vector per edge (" + std::to_string(rod.edges()) + "), found " + std::to_string(items.size()));
+    if (int(items.size()) != rod.edges())
+      list.fail("'directors' must have one vector per edge (" + std::to_string(rod.edges()) + "), found " + std::to_string(items.size()));
     for (int i = 0; i < rod.edges(); ++i) {
       const Vec3 d = unit(items[i]), t = rod.edge(i).normalized();
-      if (std::abs(d.dot(t)) > 1e-6) items[i].fail("director " + std::to_string(i) + " is not normal to its edge (cosine " + std::to_string(d.dot(t)) + "); take away its part along the edge");
+      if (std::abs(d.dot(t)) > 1e-6)
+        items[i].fail("director " + std::to_string(i) + " is not normal to its edge (cosine " + std::to_string(d.dot(t)) +
+                      "); take away its part along the edge");
       rod.director.push_back(orthonormalised(d, t));
     }
     return;
@@ -172,7 +85,8 @@ void readDirectors(YamlMap &map, Rod &rod) {
     const YamlValue v = map.at("director");
     start = unit(v);
     const double cosine = start.dot(rod.edge(0).normalized());
-    if (std::abs(cosine) > 1e-6) v.fail("'director' is not normal to the first edge (cosine " + std::to_string(cosine) + "); take away its part along the edge");
+    if (std::abs(cosine) > 1e-6)
+      v.fail("'director' is not normal to the first edge (cosine " + std::to_string(cosine) + "); take away its part along the edge");
   }
   setBishopDirectors(rod, start);
 }
@@ -201,7 +115,8 @@ std::string readName(YamlMap &map, const std::vector<Rod> &rods) {
   if (!map.has("name")) return "rod" + std::to_string(rods.size());
   const YamlValue v = map.at("name");
   const std::string name = v.text();
-  if (name.empty() || name == "all" || name.find_first_not_of("0123456789") == std::string::npos) v.fail("'name' must not be empty, a number or 'all', found '" + name + "'");
+  if (name.empty() || name == "all" || name.find_first_not_of("0123456789") == std::string::npos)
+    v.fail("'name' must not be empty, a number or 'all', found '" + name + "'");
   for (const Rod &rod : rods)
     if (isNamed(rod, name)) v.fail("there is a rod '" + name + "' already; choose another 'name'");
   return name;
@@ -220,7 +135,8 @@ void readRod(const YamlValue &value, const Overrides &overrides, std::vector<Rod
     common.material = readMaterial(material, overrides);
   }
   std::string measure = map.has("measure") ? map.at("measure").oneOf({"tan", "angle"}) : "tan";
-  if (const auto o = overrides.find("measure"); o != overrides.end()) measure = YamlValue(YAML::Node(o->second), "option -rod_measure", "measure").oneOf({"tan", "angle"});
+  if (const auto o = overrides.find("measure"); o != overrides.end())
+    measure = YamlValue(YAML::Node(o->second), "option -rod_measure", "measure").oneOf({"tan", "angle"});
   common.measure = measure == "tan" ? Measure::tan : Measure::angle;
   common.gravity = !map.has("gravity") || map.at("gravity").boolean();
   common.initial_velocity = map.vector("velocity", Vec3::Zero());
@@ -255,7 +171,8 @@ void readRod(const YamlValue &value, const Overrides &overrides, std::vector<Rod
         value.fail(e.what());
       }
       readDirectors(map, rod);
-      if (rod.closed && rod.initial_turns != std::round(rod.initial_turns)) map.at("turns").fail("'turns' of a closed rod must be a whole number, or its ends do not meet");
+      if (rod.closed && rod.initial_turns != std::round(rod.initial_turns))
+        map.at("turns").fail("'turns' of a closed rod must be a whole number, or its ends do not meet");
       if (rod.material.isCable() && rod.initial_turns != 0) map.at("turns").fail("a rod without flexural stiffness has no twist");
       rods.push_back(rod);
     }
@@ -281,7 +198,9 @@ std::vector<int> readTargets(YamlMap &map, const std::vector<Rod> &rods) {
 int readIndex(const YamlValue &v, int count, const std::string &rod) {
   if (v.isScalar() && v.node().Scalar() == "last") return count - 1;
   const int i = v.integer(0);
-  if (i >= count) v.fail("'" + v.name() + "' " + std::to_string(i) + " is out of range: rod '" + rod + "' has " + std::to_string(count) + ", numbered 0 to " + std::to_string(count - 1));
+  if (i >= count)
+    v.fail("'" + v.name() + "' " + std::to_string(i) + " is out of range: rod '" + rod + "' has " + std::to_string(count) + ", numbered 0 to " +
+           std::to_string(count - 1));
   return i;
 }
 
@@ -290,7 +209,8 @@ Motion readMotion(const YamlValue &value) {
   Motion m;
   m.velocity = map.vector("velocity", Vec3::Zero());
   m.angular_velocity = map.vector("angular_velocity", Vec3::Zero());
-  if (!map.has("velocity") && !map.has("angular_velocity") && !map.has("table")) value.fail("'motion' needs 'velocity' and/or 'angular_velocity', or a 'table'");
+  if (!map.has("velocity") && !map.has("angular_velocity") && !map.has("table"))
+    value.fail("'motion' needs 'velocity' and/or 'angular_velocity', or a 'table'");
   if (map.has("table")) {
     if (map.has("velocity") || map.has("angular_velocity")) value.fail("'motion' takes a 'table' or velocities, not both");
     for (const YamlValue &row : map.at("table").items()) {
@@ -298,7 +218,8 @@ Motion readMotion(const YamlValue &value) {
       if (n != 4 && n != 7) row.fail("a row of 'table' is [time, dx, dy, dz] or [time, dx, dy, dz, rx, ry, rz]");
       const std::vector<double> v = row.numbers(n);
       m.table.push_back({v[0], Vec3(v[1], v[2], v[3]), n == 7 ? Vec3(v[4], v[5], v[6]) : Vec3(Vec3::Zero())});
-      if (m.table.size() > 1 && m.table[m.table.size() - 2].time >= v[0]) row.fail("the times of 'table' must increase, found " + std::to_string(v[0]) + " after " + std::to_string(m.table[m.table.size() - 2].time));
+      if (m.table.size() > 1 && m.table[m.table.size() - 2].time >= v[0])
+        row.fail("the times of 'table' must increase, found " + std::to_string(v[0]) + " after " + std::to_string(m.table[m.table.size() - 2].time));
     }
     if (m.table.empty()) value.fail("'table' is empty");
   }
@@ -337,7 +258,8 @@ void readSupport(const YamlValue &value, Scene &scene) {
       const auto turns = [](const Motion::Key &k) { return !k.rotation.isZero(0); };
       const auto travels = [](const Motion::Key &k) { return !k.displacement.isZero(0); };
       const auto &table = s.motion.table;
-      if (type == "pin" && (!s.motion.angular_velocity.isZero(0) || std::any_of(table.begin(), table.end(), turns))) motion.fail("a pin holds no rotation; take it away or write 'type: clamp'");
+      if (type == "pin" && (!s.motion.angular_velocity.isZero(0) || std::any_of(table.begin(), table.end(), turns)))
+        motion.fail("a pin holds no rotation; take it away or write 'type: clamp'");
       if (type == "fix_twist" && (!s.motion.velocity.isZero(0) || std::any_of(table.begin(), table.end(), travels)))
         motion.fail("fix_twist holds no position; take the displacement away or add a pin that moves");
     }
@@ -374,27 +296,6 @@ void readRun(const YamlValue &value, RunSettings &run) {
 }
 
 } // namespace
-
-const std::vector<std::pair<std::string, std::string>> &rodOverrides() {
-  static const std::vector<std::pair<std::string, std::string>> list{
-      {"radius", "radius of a circular section [m]"},
-      {"radii", "semi-axes of an elliptic section, e.g. [2e-3,1e-3] [m]"},
-      {"width", "width of a rectangular section, along the first director [m]"},
-      {"height", "height of a rectangular section, along the second director [m]"},
-      {"young", "Young's modulus [Pa]"},
-      {"poisson", "Poisson's ratio"},
-      {"shear", "shear modulus [Pa]"},
-      {"density", "density [kg/m^3]"},
-      {"linear_density", "mass per length [kg/m]"},
-      {"linear_rotational_inertia", "rotational inertia about the axis per length [kg m]"},
-      {"axial_stiffness", "EA [N]"},
-      {"torsional_stiffness", "GJ [N m^2]"},
-      {"flexural_stiffness", "EI, one number or [kb1,kb2] [N m^2]"},
-      {"mass_damping_coefficient", "dissipation proportional to mass [1/s]"},
-      {"stiffness_damping_coefficient", "dissipation proportional to stiffness [s]"},
-      {"measure", "strain measure: tan or angle"}};
-  return list;
-}
 
 SceneFile readScene(const std::string &path, const Overrides &overrides) {
   YAML::Node root;

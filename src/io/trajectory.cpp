@@ -41,19 +41,42 @@ const std::vector<std::string> &TrajectoryWriter::fieldNames() {
 }
 
 const std::vector<std::string> &Diagnostics::names() {
-  static const std::vector<std::string> names{"time", "dt", "kinetic", "stretch", "bend", "twist", "gravity", "dissipated", "newton_iterations",
-                                              "line_search_trials", "negative_pivots", "rejected_steps", "wall_seconds"};
+  static const std::vector<std::string> names{"time",
+                                              "dt",
+                                              "kinetic",
+                                              "stretch",
+                                              "bend",
+                                              "twist",
+                                              "gravity",
+                                              "dissipated",
+                                              "newton_iterations",
+                                              "line_search_trials",
+                                              "negative_pivots",
+                                              "rejected_steps",
+                                              "wall_seconds"};
   return names;
 }
 
 std::vector<double> Diagnostics::values() const {
-  return {time, dt, energy.kinetic, energy.stretch, energy.bend, energy.twist, energy.gravity, dissipated, double(newton_iterations),
-          double(line_search_trials), double(negative_pivots), double(rejected_steps), wall_seconds};
+  return {time,
+          dt,
+          energy.kinetic,
+          energy.stretch,
+          energy.bend,
+          energy.twist,
+          energy.gravity,
+          dissipated,
+          double(newton_iterations),
+          double(line_search_trials),
+          double(negative_pivots),
+          double(rejected_steps),
+          wall_seconds};
 }
 
 TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene, const Elements &elements, const Provenance &provenance,
                                    const std::set<std::string> &wanted)
-    : folder_(folder), rods_(elements.rods.size()), vertices_(int(elements.mass.size())), edges_(int(elements.vertex0.size())), file_(Hdf5File::create(folder + "/trajectory.h5")) {
+    : folder_(folder), rods_(elements.rods.size()), vertices_(int(elements.mass.size())), edges_(int(elements.vertex0.size())),
+      file_(Hdf5File::create(folder + "/trajectory.h5")) {
   writeHeader(scene, elements, provenance);
   file_.createGroup("state");
   for (const Field &f : fields) {
@@ -63,7 +86,8 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
     state_.emplace_back(f.name, std::make_unique<Hdf5Series>(file_, std::string("state/") + f.name, slab));
   }
   file_.createGroup("diagnostics");
-  for (const std::string &name : Diagnostics::names()) diagnostics_.push_back(std::make_unique<Hdf5Series>(file_, "diagnostics/" + name, std::vector<hsize_t>{}));
+  for (const std::string &name : Diagnostics::names())
+    diagnostics_.push_back(std::make_unique<Hdf5Series>(file_, "diagnostics/" + name, std::vector<hsize_t>{}));
   step_ = std::make_unique<Hdf5Series>(file_, "step", std::vector<hsize_t>{}, true);
   time_ = std::make_unique<Hdf5Series>(file_, "time", std::vector<hsize_t>{});
   file_.startAppending();
@@ -158,18 +182,20 @@ void TrajectoryWriter::writeXdmf() const {
     out << std::setprecision(17);
     const std::size_t nt = times_.size();
     auto dataset = [&](const std::string &name, const std::string &shape, const char *type, int bytes) {
-      out << "<DataItem Dimensions=\"" << shape << "\" NumberType=\"" << type << "\" Precision=\"" << bytes << "\" Format=\"HDF\">trajectory.h5:/" << name << "</DataItem>\n";
+      out << "<DataItem Dimensions=\"" << shape << "\" NumberType=\"" << type << "\" Precision=\"" << bytes << "\" Format=\"HDF\">trajectory.h5:/" << name
+          << "</DataItem>\n";
     };
     // One frame out of a dataset (nt, n[, 3]). ParaView takes the first text in here as the geometry's name: it keeps what it read under that
     // name, and complains when there is none.
     auto frameOf = [&](const Field &f, std::size_t frame) {
       const std::string shape = std::to_string(f.on_vertices ? vertices_ : edges_) + (f.components > 1 ? " " + std::to_string(f.components) : "");
-      out << "     <DataItem ItemType=\"HyperSlab\" Dimensions=\"" << shape << "\"><!-- frame " << frame << " --><DataItem Dimensions=\"3 " << (f.components > 1 ? 3 : 2) << "\" Format=\"XML\">" << frame
-          << (f.components > 1 ? " 0 0 1 1 1 1 " : " 0 1 1 1 ") << shape << "</DataItem>";
+      out << "     <DataItem ItemType=\"HyperSlab\" Dimensions=\"" << shape << "\"><!-- frame " << frame << " --><DataItem Dimensions=\"3 "
+          << (f.components > 1 ? 3 : 2) << "\" Format=\"XML\">" << frame << (f.components > 1 ? " 0 0 1 1 1 1 " : " 0 1 1 1 ") << shape << "</DataItem>";
       dataset(std::string("state/") + f.name, std::to_string(nt) + " " + shape, "Float", 8);
       out << "     </DataItem>\n";
     };
-    out << "<?xml version=\"1.0\"?>\n<!-- In ParaView choose \"XDMF Reader\"; its Xdmf3 readers do not know HyperSlab. -->\n<Xdmf Version=\"3.0\">\n <Domain>\n";
+    out << "<?xml version=\"1.0\"?>\n<!-- In ParaView choose \"XDMF Reader\"; its Xdmf3 readers do not know HyperSlab. -->\n<Xdmf Version=\"3.0\">\n "
+           "<Domain>\n";
     for (const bool edges : {false, true}) {
       out << "  <Grid Name=\"" << (edges ? "edges" : "rods") << "\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
       for (std::size_t frame = 0; frame < nt; ++frame) {
@@ -187,7 +213,8 @@ void TrajectoryWriter::writeXdmf() const {
         for (const Field &f : fields) {
           const bool written = std::any_of(state_.begin(), state_.end(), [&](const auto &s) { return s.first == f.name; });
           if (&f == &fields[0] || !written || (!f.on_vertices && !edges)) continue;
-          out << "    <Attribute Name=\"" << f.name << "\" AttributeType=\"" << (f.components > 1 ? "Vector" : "Scalar") << "\" Center=\"" << (f.on_vertices ? "Node" : "Cell") << "\">\n";
+          out << "    <Attribute Name=\"" << f.name << "\" AttributeType=\"" << (f.components > 1 ? "Vector" : "Scalar") << "\" Center=\""
+              << (f.on_vertices ? "Node" : "Cell") << "\">\n";
           frameOf(f, frame);
           out << "    </Attribute>\n";
         }

@@ -78,7 +78,8 @@ double YamlValue::notNegative() const {
 int YamlValue::integer(int least, int most) const {
   int value;
   if (!node_.IsScalar() || !YAML::convert<int>::decode(node_, value)) fail("'" + name_ + "' must be a whole number, found " + describe(node_));
-  if (value < least || value > most) fail("'" + name_ + "' must be at least " + std::to_string(least) + " and at most " + std::to_string(most) + ", found " + describe(node_));
+  if (value < least || value > most)
+    fail("'" + name_ + "' must be at least " + std::to_string(least) + " and at most " + std::to_string(most) + ", found " + describe(node_));
   return value;
 }
 
@@ -94,8 +95,7 @@ std::string YamlValue::text() const {
 }
 
 std::vector<double> YamlValue::numbers(std::size_t count) const {
-  if (!node_.IsSequence() || node_.size() != count)
-    fail("'" + name_ + "' must be a list of " + std::to_string(count) + " numbers, found " + describe(node_));
+  if (!node_.IsSequence() || node_.size() != count) fail("'" + name_ + "' must be a list of " + std::to_string(count) + " numbers, found " + describe(node_));
   std::vector<double> values;
   for (const YAML::Node &n : node_) values.push_back(YamlValue(n, file_, name_).number());
   return values;

@@ -69,8 +69,8 @@ private:
       add(vertex, frame, own, held, f, 0.5 * f.length, {0, 0.5}, {0, 1}, flexural, rod_.material.torsional_stiffness);
   }
 
-  void add(int vertex, int frame0, int frame1, const Frame &f0, const Frame &f1, double length, std::array<double, 2> weight,
-           std::array<double, 2> free, std::array<double, 2> flexural, double torsional) {
+  void add(int vertex, int frame0, int frame1, const Frame &f0, const Frame &f1, double length, std::array<double, 2> weight, std::array<double, 2> free,
+           std::array<double, 2> flexural, double torsional) {
     CellOf<double> cell{};
     cell.weight = {weight[0] / length, weight[1] / length};
     cell.free = free;
@@ -110,8 +110,7 @@ void CellArrays::pad() {
 }
 
 Elements::Elements(const Scene &scene, const DofMap &dofs) : rods(dofs.rods()), mass(dofs.vertices(), 0.0), frames(dofs.edges()) {
-  for (const Support &s : scene.supports)
-    support_frame.push_back(s.holdsTwist() && !scene.rods[s.rod].material.isCable() ? frames++ : -1);
+  for (const Support &s : scene.supports) support_frame.push_back(s.holdsTwist() && !scene.rods[s.rod].material.isCable() ? frames++ : -1);
   rod_cells.push_back(0);
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
     const Rod &rod = scene.rods[r];

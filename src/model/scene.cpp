@@ -24,9 +24,7 @@ Vec3 interpolate(const std::vector<Motion::Key> &table, double time, Vec3 Motion
 
 } // namespace
 
-Vec3 Motion::displacementAt(double time) const {
-  return table.empty() ? Vec3(velocity * time) : interpolate(table, time, &Key::displacement);
-}
+Vec3 Motion::displacementAt(double time) const { return table.empty() ? Vec3(velocity * time) : interpolate(table, time, &Key::displacement); }
 
 Mat3 Motion::rotationAt(double time) const {
   const Vec3 r = table.empty() ? Vec3(angular_velocity * time) : interpolate(table, time, &Key::rotation);
@@ -104,7 +102,8 @@ void checkRod(const Rod &rod) {
     const int a = rod.edgeBefore(v), b = rod.edgeAfter(v);
     if (a < 0 || b < 0) continue;
     const double c = rod.edge(a).normalized().dot(rod.edge(b).normalized());
-    if (c < -0.9999) fail("folds back on itself at vertex ", v, " (turning angle ", degrees(std::acos(std::max(-1.0, c))), " degrees); edges may turn by less than 179");
+    if (c < -0.9999)
+      fail("folds back on itself at vertex ", v, " (turning angle ", degrees(std::acos(std::max(-1.0, c))), " degrees); edges may turn by less than 179");
   }
 }
 

@@ -45,8 +45,7 @@ private:
   static Dual combine(const Dual &a, const Dual &b, double f, double fa, double fb, double faa, double fab, double fbb) {
     Dual r(f);
     r.g = fa * a.g + fb * b.g;
-    r.h = fa * a.h + fb * b.h + faa * a.g * a.g.transpose() + fbb * b.g * b.g.transpose() +
-          fab * (a.g * b.g.transpose() + b.g * a.g.transpose());
+    r.h = fa * a.h + fb * b.h + faa * a.g * a.g.transpose() + fbb * b.g * b.g.transpose() + fab * (a.g * b.g.transpose() + b.g * a.g.transpose());
     return r;
   }
 };

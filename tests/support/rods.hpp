@@ -27,9 +27,7 @@ inline Rod straightRod(int edges, Measure measure = Measure::tan, double length 
   return inextensibleRod(lineShape(Vec3::Zero(), Vec3(length, 0, 0), edges).points, measure);
 }
 
-inline Support hold(const Scene &scene, int rod, int vertex, Support::Kind kind) {
-  return {kind, rod, vertex, {}, frameAtVertex(scene.rods[rod], vertex)};
-}
+inline Support hold(const Scene &scene, int rod, int vertex, Support::Kind kind) { return {kind, rod, vertex, {}, frameAtVertex(scene.rods[rod], vertex)}; }
 
 /// Scene of one rod, without gravity, clamped at its first vertex.
 inline Scene clampedScene(Rod rod) {

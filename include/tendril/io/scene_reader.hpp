@@ -2,9 +2,7 @@
 /// \file scene_reader.hpp
 /// Scenes from YAML. docs/user.md describes every key.
 
-#include "tendril/model/scene.hpp"
-
-#include <map>
+#include "tendril/io/material_reader.hpp"
 
 namespace tendril {
 
@@ -21,11 +19,7 @@ struct SceneFile {
   RunSettings run;
 };
 
-/// Material parameters that -rod_<parameter> may override, with what each means.
-const std::vector<std::pair<std::string, std::string>> &rodOverrides();
-
-/// \param overrides parameter name -> text, applied to every rod's material (and `measure`)
 /// \throws SceneError
-SceneFile readScene(const std::string &path, const std::map<std::string, std::string> &overrides = {});
+SceneFile readScene(const std::string &path, const Overrides &overrides = {});
 
 } // namespace tendril

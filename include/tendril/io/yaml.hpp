@@ -21,16 +21,16 @@ public:
   bool isMap() const { return node_.IsMap(); }
   bool isScalar() const { return node_.IsScalar(); }
 
-  double number() const;                         ///< finite
-  double positive() const;                       ///< finite, > 0
-  double notNegative() const;                    ///< finite, >= 0
+  double number() const;      ///< finite
+  double positive() const;    ///< finite, > 0
+  double notNegative() const; ///< finite, >= 0
   int integer(int least, int most = 10'000'000) const;
   bool boolean() const;
   std::string text() const;
-  Vec3 vector() const;                           ///< three finite numbers
+  Vec3 vector() const; ///< three finite numbers
   std::vector<double> numbers(std::size_t count) const;
   std::string oneOf(const std::vector<std::string> &choices) const;
-  std::vector<YamlValue> items() const;          ///< of a list
+  std::vector<YamlValue> items() const; ///< of a list
 
 private:
   YAML::Node node_;
@@ -42,7 +42,7 @@ class YamlMap {
 public:
   explicit YamlMap(const YamlValue &value);
   bool has(const std::string &key);
-  YamlValue at(const std::string &key);                     ///< required
+  YamlValue at(const std::string &key); ///< required
   /// Allowed keys beyond those asked for are none: call when all has been read.
   void finish() const;
   const YamlValue &value() const { return value_; }

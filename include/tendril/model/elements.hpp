@@ -22,13 +22,13 @@ struct CellArrays {
 
 struct Elements {
   std::vector<RodRange> rods;
-  std::vector<int> rod_cells; ///< offsets (nr + 1)
+  std::vector<int> rod_cells;   ///< offsets (nr + 1)
   std::vector<Measure> measure; ///< per rod
 
-  std::vector<int> vertex0, vertex1, edge_row; ///< per edge; rows of its vertices begin at edge_row and edge_row + stride
+  std::vector<int> vertex0, vertex1, edge_row;                                       ///< per edge; rows of its vertices begin at edge_row and edge_row + stride
   std::vector<double> rest_length, inverse_rest_length, axial_stiffness, twist_mass; ///< per edge; twist_mass r_L L [kg m^2]
-  std::vector<double> mass;    ///< per vertex [kg]
-  std::vector<int> vertex_row; ///< per vertex
+  std::vector<double> mass;                                                          ///< per vertex [kg]
+  std::vector<int> vertex_row;                                                       ///< per vertex
   CellArrays cells;
 
   std::vector<int> support_frame; ///< frame of each support, or -1

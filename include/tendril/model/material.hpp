@@ -8,13 +8,13 @@ namespace tendril {
 
 /// Parameters of a rod and their defaults, SI units.
 struct Material {
-  double linear_density = 1e-1;                          ///< [kg/m]
-  double linear_rotational_inertia = 1e-6;               ///< about the rod's axis [kg m]
-  double axial_stiffness = 1e2;                          ///< [N]
-  double torsional_stiffness = 5e-4;                     ///< [N m^2]
-  std::array<double, 2> flexural_stiffness{5e-4, 5e-4};  ///< about the first and the second director [N m^2]
-  double mass_damping_coefficient = 0;                   ///< [1/s]
-  double stiffness_damping_coefficient = 0;              ///< [s]
+  double linear_density = 1e-1;                         ///< [kg/m]
+  double linear_rotational_inertia = 1e-6;              ///< about the rod's axis [kg m]
+  double axial_stiffness = 1e2;                         ///< [N]
+  double torsional_stiffness = 5e-4;                    ///< [N m^2]
+  std::array<double, 2> flexural_stiffness{5e-4, 5e-4}; ///< about the first and the second director [N m^2]
+  double mass_damping_coefficient = 0;                  ///< [1/s]
+  double stiffness_damping_coefficient = 0;             ///< [s]
 
   /// A cable: bending and twist cost nothing and the rod carries no twist unknowns.
   bool isCable() const { return flexural_stiffness[0] == 0 && flexural_stiffness[1] == 0; }

@@ -27,7 +27,7 @@ struct Rod {
   bool gravity = true;
   /// Natural curvature about the two directors and twist (each [1/m]) where the rod is not stress-free as drawn.
   enum class Natural { as_drawn, given } natural = Natural::as_drawn;
-  Vec3 natural_strain = Vec3::Zero(); ///< (curvature 1, curvature 2, twist) for Natural::given; zero is a straight rod
+  Vec3 natural_strain = Vec3::Zero();   ///< (curvature 1, curvature 2, twist) for Natural::given; zero is a straight rod
   Vec3 initial_velocity = Vec3::Zero(); ///< [m/s]
 
   double initial_turns = 0; ///< turns of twist put in at the start, spread by arc length; the natural shape does not have them
@@ -104,11 +104,11 @@ void checkRod(const Rod &rod);
 
 /// Sizes of one rod that tell what to expect of it.
 struct DimensionlessGroups {
-  double length;               ///< [m]
-  double gravito_bending;      ///< rho_L g L^3 / EI
-  double axial_to_bending;     ///< EA L^2 / EI
-  double largest_turning;      ///< per vertex [deg]
-  double largest_twist;        ///< per vertex, of the reference directors [deg]
+  double length;           ///< [m]
+  double gravito_bending;  ///< rho_L g L^3 / EI
+  double axial_to_bending; ///< EA L^2 / EI
+  double largest_turning;  ///< per vertex [deg]
+  double largest_twist;    ///< per vertex, of the reference directors [deg]
 };
 DimensionlessGroups dimensionlessGroups(const Rod &rod, const Vec3 &gravity);
 

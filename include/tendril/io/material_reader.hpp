@@ -1,0 +1,20 @@
+#pragma once
+/// \file material_reader.hpp
+/// The material of a rod from its block in the scene and from -rod_<parameter>.
+
+#include "tendril/io/yaml.hpp"
+
+#include <map>
+
+namespace tendril {
+
+/// Parameter name -> text, from the command line; they replace what the scene says of every rod.
+using Overrides = std::map<std::string, std::string>;
+
+/// Parameters that -rod_<parameter> may override, with what each means.
+const std::vector<std::pair<std::string, std::string>> &rodOverrides();
+
+/// \throws SceneError
+Material readMaterial(YamlMap &map, const Overrides &overrides);
+
+} // namespace tendril

@@ -1,0 +1,174 @@
+/// Scenes from YAML. Numbers are taken over exactly unless a tolerance is given. Mistakes are in tests/apps/bad_input.py.
+#include "tendril/io/scene_reader.hpp"
+
+#include "support/files.hpp"
+
+#include <cmath>
+
+namespace tendril::test {
+namespace {
+
+const std::string line = "line: {from: [0, 0, 0], to: [1, 0, 0], edges: 4}";
+
+SceneFile read(const std::string &text, const std::map<std::string, std::string> &overrides = {}) {
+  const Folder folder;
+  return readScene(folder.write("scene.yaml", text), overrides);
+}
+
+/// The only rod of a scene whose rod block is `text`.
+Rod readRod(const std::string &text, const std::map<std::string, std::string> &overrides = {}) {
+  return read("rods: [{" + text + "}]", overrides).scene.rods.at(0);
+}
+
+TEST(SceneReader, DefaultsAreTheStiffnessParametersOfAThinRod) {
+  const SceneFile file = read("rods:\n  - " + line + "\n");
+  const Scene &scene = file.scene;
+  ASSERT_EQ(scene.rods.size(), 1u);
+  const Rod &rod = scene.rods[0];
+  const Material &m = rod.material;
+  EXPECT_EQ(rod.name, "rod0");
+  EXPECT_EQ(rod.vertices(), 5);
+  EXPECT_FALSE(rod.closed);
+  EXPECT_TRUE(rod.gravity);
+  EXPECT_EQ(rod.measure, Measure::tan);
+  EXPECT_EQ(rod.natural, Rod::Natural::as_drawn);
+  EXPECT_EQ(scene.gravity, Vec3(0, -9.81, 0));
+  EXPECT_EQ(m.linear_density, 1e-1);
+  EXPECT_EQ(m.linear_rotational_inertia, 1e-6);
+  EXPECT_EQ(m.axial_stiffness, 1e2);
+  EXPECT_EQ(m.torsional_stiffness, 5e-4);
+  EXPECT_EQ(m.flexural_stiffness, (std::array<double, 2>{5e-4, 5e-4}));
+  EXPECT_EQ(m.mass_damping_coefficient, 0);
+  EXPECT_EQ(m.stiffness_damping_coefficient, 0);
+  EXPECT_EQ(file.run.mode, "dynamic");
+  EXPECT_TRUE(scene.supports.empty() && scene.forces.empty() && scene.moments.empty());
+}
+
+TEST(SceneReader, SimulationBlock) {
+  const RunSettings run = read("simulation: {mode: static, dt: 0.25, t_end: 3, load_steps: 7}\nrods:\n  - " + line + "\n").run;
+  EXPECT_EQ(run.mode, "static");
+  EXPECT_EQ(run.dt, 0.25);
+  EXPECT_EQ(run.t_end, 3);
+  EXPECT_EQ(run.load_steps, 7);
+}
+
+TEST(SceneReader, SectionsOfEveryShape) {
+  const std::string elastic = "young: 1e6, poisson: 0.25, density: 1000";
+  const Material circle = readRod(line + ", material: {radius: 0.01, " + elastic + "}").material;
+  EXPECT_DOUBLE_EQ(circle.axial_stiffness, 1e6 * pi * 1e-4);
+  EXPECT_DOUBLE_EQ(circle.torsional_stiffness, 1e6 / 2.5 * pi * 1e-8 / 2); // G = E/(2 (1 + nu))
+  const Material ellipse = readRod(line + ", material: {radii: [0.02, 0.01], " + elastic + "}").material;
+  EXPECT_DOUBLE_EQ(ellipse.flexural_stiffness[1] / ellipse.flexural_stiffness[0], 4); // stiffer in the plane of the long axis
+  const Material strip = readRod(line + ", material: {width: 0.02, height: 0.01, young: 1e6, shear: 5e5, density: 1000}").material;
+  EXPECT_DOUBLE_EQ(strip.flexural_stiffness[0], 1e6 * 0.02 * 1e-6 / 12);
+  EXPECT_DOUBLE_EQ(strip.linear_density, 0.2);
+}
+
+TEST(SceneReader, StiffnessParametersReplaceThoseOfTheSection) {
+  const Material m = readRod(line + ", material: {radius: 0.01, young: 1e6, poisson: 0.5, density: 1000, axial_stiffness: 5, flexural_stiffness: [1, 2], "
+                                    "stiffness_damping_coefficient: 0.1}")
+                         .material;
+  EXPECT_EQ(m.axial_stiffness, 5);
+  EXPECT_EQ(m.flexural_stiffness, (std::array<double, 2>{1, 2}));
+  EXPECT_EQ(m.stiffness_damping_coefficient, 0.1);
+  EXPECT_DOUBLE_EQ(m.linear_density, 1000 * pi * 1e-4);
+  EXPECT_TRUE(readRod(line + ", material: {flexural_stiffness: 0}").material.isCable());
+}
+
+TEST(SceneReader, OverridesReachEveryRod) {
+  const std::string text = "rods:\n  - {" + line + ", material: {radius: 0.01, young: 1e6, poisson: 0.5, density: 1000}}\n  - {" + line +
+                           ", measure: tan, material: {radius: 0.02, young: 1e6, poisson: 0.5, density: 1000}}\n";
+  const Scene plain = read(text).scene, changed = read(text, {{"young", "2e6"}, {"flexural_stiffness", "[3,4]"}, {"measure", "angle"}}).scene;
+  for (int r = 0; r < 2; ++r) {
+    EXPECT_DOUBLE_EQ(changed.rods[r].material.axial_stiffness, 2 * plain.rods[r].material.axial_stiffness);
+    EXPECT_EQ(changed.rods[r].material.flexural_stiffness, (std::array<double, 2>{3, 4}));
+    EXPECT_EQ(changed.rods[r].measure, Measure::angle);
+  }
+  EXPECT_EQ(read("rods:\n  - " + line + "\n", {{"axial_stiffness", "7"}}).scene.rods[0].material.axial_stiffness, 7); // a rod without a material
+}
+
+TEST(SceneReader, NaturalShapes) {
+  EXPECT_EQ(readRod(line + ", natural: as_drawn").natural, Rod::Natural::as_drawn);
+  const Rod straight = readRod("ring: {radius: 1, edges: 8}, natural: straight");
+  EXPECT_EQ(straight.natural, Rod::Natural::given);
+  EXPECT_EQ(straight.natural_strain, Vec3::Zero());
+  const Rod curved = readRod(line + ", natural: {curvature: [1, 2], twist: 3}");
+  EXPECT_EQ(curved.natural, Rod::Natural::given);
+  EXPECT_EQ(curved.natural_strain, Vec3(1, 2, 3));
+  EXPECT_EQ(readRod(line + ", natural: {twist: 3}").natural_strain, Vec3(0, 0, 3));
+}
+
+TEST(SceneReader, ShapesAndDirectors) {
+  const Rod ring = readRod("ring: {center: [0, 0, 1], normal: [0, 0, 2], radius: 0.5, edges: 12}, turns: -2");
+  EXPECT_TRUE(ring.closed);
+  EXPECT_EQ(ring.edges(), 12);
+  EXPECT_EQ(ring.initial_turns, -2);
+  const Rod points = readRod("points: [[0, 0, 0], [1, 0, 0], [1, 1, 0]], closed: true, gravity: false, velocity: [1, 2, 3]");
+  EXPECT_TRUE(points.closed);
+  EXPECT_FALSE(points.gravity);
+  EXPECT_EQ(points.initial_velocity, Vec3(1, 2, 3));
+  EXPECT_EQ(readRod(line + ", director: [0, 0, 3]").director[3], Vec3(0, 0, 1));
+  const Rod each = readRod("points: [[0, 0, 0], [1, 0, 0], [2, 0, 0]], directors: [[0, 2, 0], [0, 0, -1]]");
+  EXPECT_EQ(each.director, (std::vector<Vec3>{{0, 1, 0}, {0, 0, -1}}));
+}
+
+TEST(SceneReader, CopiesAndFilesMakeSeveralRods) {
+  const Folder folder;
+  folder.write("two.csv", "0 0 0\n1 0 0\n\n0 1 0\n1 1 0\n2 1 0\n");
+  const Scene scene = readScene(folder.write("scene.yaml", "rods:\n  - {name: a, file: two.csv, copies: {count: 3, offset: [0, 0, 2]}}\n  - {name: b, " + line +
+                                                               "}\n"
+                                                               "supports:\n  - {rod: a, vertex: last, type: pin}\n  - {rod: b, vertex: 0, type: pin}\n"
+                                                               "loads:\n  - {rod: all, vertex: 0, force: [0, 0, 1]}\n  - {rod: a.1, edge: last, torque: 2}\n"))
+                          .scene;
+  ASSERT_EQ(scene.rods.size(), 7u);
+  EXPECT_EQ(scene.rods[3].name, "a.1#1");
+  EXPECT_EQ(scene.rods[3].vertices(), 3);
+  EXPECT_EQ(scene.rods[5].position[0], Vec3(0, 1, 4));
+  ASSERT_EQ(scene.supports.size(), 7u); // all six of a, one of b
+  EXPECT_EQ(scene.supports[0].vertex, 1);
+  EXPECT_EQ(scene.supports[1].vertex, 2);
+  EXPECT_EQ(scene.supports[6].rod, 6);
+  EXPECT_EQ(scene.forces.size(), 7u);
+  ASSERT_EQ(scene.moments.size(), 3u); // the copies of one polyline
+  EXPECT_EQ(scene.moments[0].rod, 1);
+  EXPECT_EQ(scene.moments[0].edge, 1);
+}
+
+TEST(SceneReader, SupportsAndMotions) {
+  const Scene scene = read("rods:\n  - " + line +
+                           "\nsupports:\n"
+                           "  - {vertex: 0, type: clamp, tangent: [0, 2, 0], director: [0, 0, 1], motion: {velocity: [1, 0, 0], angular_velocity: [0, 1, 0]}}\n"
+                           "  - {vertex: 2, type: pin, motion: {table: [[0, 0, 0, 0], [1, 0, 0, 2]]}}\n"
+                           "  - {vertex: 4, type: fix_twist, motion: {table: [[0, 0, 0, 0, 0, 0, 0], [1, 0, 0, 0, 3, 0, 0]]}}\n")
+                          .scene;
+  ASSERT_EQ(scene.supports.size(), 3u);
+  EXPECT_EQ(scene.supports[0].kind, Support::Kind::clamp);
+  EXPECT_EQ(scene.supports[0].frame.tangent, Vec3(0, 1, 0));
+  EXPECT_EQ(scene.supports[0].frame.director, Vec3(0, 0, 1));
+  EXPECT_EQ(scene.supports[0].motion.displacementAt(2), Vec3(2, 0, 0));
+  EXPECT_EQ(scene.supports[1].kind, Support::Kind::pin);
+  EXPECT_EQ(scene.supports[1].motion.displacementAt(0.5), Vec3(0, 0, 1));
+  EXPECT_EQ(scene.supports[2].kind, Support::Kind::fix_twist);
+  const Mat3 turned = Eigen::AngleAxisd(1.5, Vec3::UnitX()).toRotationMatrix();
+  EXPECT_LT((scene.supports[2].motion.rotationAt(0.5) - turned).norm(), 1e-15); // one rotation matrix
+}
+
+TEST(SceneReader, Loads) {
+  const Scene scene = read("rods:\n  - " + line + "\nloads:\n  - {vertex: last, force: [1, 2, 3]}\n  - {edge: 1, torque: 4, moment: [0, 5, 0]}\n").scene;
+  ASSERT_EQ(scene.forces.size(), 1u);
+  EXPECT_EQ(scene.forces[0].vertex, 4);
+  EXPECT_EQ(scene.forces[0].force, Vec3(1, 2, 3));
+  ASSERT_EQ(scene.moments.size(), 1u);
+  EXPECT_EQ(scene.moments[0].edge, 1);
+  EXPECT_EQ(scene.moments[0].torque, 4);
+  EXPECT_EQ(scene.moments[0].moment, Vec3(0, 5, 0));
+}
+
+TEST(SceneReader, ErrorsNameTheirLine) {
+  EXPECT_TRUE(
+      says(messageOf([] { read("gravity: [0, 0, 0]\nrods:\n  - name: a\n    " + line + "\n    colour: red\n"); }), "scene.yaml:5: unknown key 'colour'"));
+  EXPECT_TRUE(says(messageOf([] { read("rods:\n  - " + line + "\n", {{"linear_density", "heavy"}}); }), "option -rod_linear_density: "));
+}
+
+} // namespace
+} // namespace tendril::test
