@@ -12,7 +12,7 @@ namespace tendril {
 /// One value of a YAML file.
 class YamlValue {
 public:
-  YamlValue(YAML::Node node, std::string file, std::string name) : node_(std::move(node)), file_(std::move(file)), name_(std::move(name)) {}
+  YamlValue(const YAML::Node &node, std::string file, std::string name) : node_(node), file_(std::move(file)), name_(std::move(name)) {}
 
   [[noreturn]] void fail(const std::string &message) const;
   const std::string &name() const { return name_; }
