@@ -10,22 +10,19 @@ namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
-/// Force that measures the loads on each rod: its weight and the forces and couples on it; where there are none, the force that bends it
-/// (EI/L^2), or for a cable one that stretches it by 1e-4.
-std::vector<double> loadScales(const Scene &scene, const std::vector<double> &length) {
-  std::vector<double> scale;
+/// Loads on each rod [N]: its weight and the forces and couples on it.
+std::vector<double> loads(const Scene &scene, const std::vector<double> &length) {
+  std::vector<double> load;
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
     const Rod &rod = scene.rods[r];
-    const Material &m = rod.material;
-    double s = rod.gravity ? m.linear_density * length[r] * scene.gravity.norm() : 0;
+    double s = rod.gravity ? rod.material.linear_density * length[r] * scene.gravity.norm() : 0;
     for (const NodalForce &f : scene.forces)
       if (f.rod == int(r)) s += f.force.norm();
     for (const EdgeMoment &c : scene.moments)
       if (c.rod == int(r)) s += (std::abs(c.torque) + c.moment.norm()) / length[r];
-    if (s == 0) s = m.isCable() ? 1e-4 * m.axial_stiffness : std::max(m.flexural_stiffness[0], m.flexural_stiffness[1]) / (length[r] * length[r]);
-    scale.push_back(s);
+    load.push_back(s);
   }
-  return scale;
+  return load;
 }
 
 } // namespace
@@ -40,7 +37,7 @@ IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, con
     for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) sum += elements.rest_length[i];
     length_.push_back(sum);
   }
-  force_scale_ = loadScales(scene, length_);
+  load_ = loads(scene, length_);
 }
 
 void IncrementalPotential::beginStep(const State &start, const Step &step) {
@@ -51,12 +48,34 @@ void IncrementalPotential::beginStep(const State &start, const Step &step) {
   start_frame_.assign(iterate_.frame.begin(), iterate_.frame.begin() + dofs_.edges());
   for (auto &term : terms_) term->beginStep(start_, iterate_, step_);
   turnSupports();
+  setForceScales();
   retraction.setInverseTimeSquared(step.isStatic() ? 0 : 1 / (step.dt * step.dt));
   current_ = false;
 }
 
+/// The force that measures each rod's residual: its loads. A rod without any is measured by the force that deforms it,
+/// the smallest of EI/L^2, GJ/L^2 and 1e-4 EA, or, where that is smaller, by the force that would stop it within the step.
+void IncrementalPotential::setForceScales() {
+  force_scale_ = load_;
+  for (std::size_t r = 0; r < load_.size(); ++r) {
+    if (load_[r] > 0) continue;
+    const Material &m = scene_.rods[r].material;
+    const RodRange &rod = elements_.rods[r];
+    double softest = 1e-4 * m.axial_stiffness * length_[r] * length_[r];
+    if (!m.isCable())
+      for (const double k : {m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness})
+        if (k > 0) softest = std::min(softest, k);
+    force_scale_[r] = softest / (length_[r] * length_[r]);
+    if (step_.isStatic()) continue;
+    double momentum = 0;
+    for (int v = rod.first_vertex; v < rod.first_vertex + rod.vertices; ++v) momentum += elements_.mass[v] * start_.velocity[v].norm();
+    if (momentum > 0) force_scale_[r] = std::min(force_scale_[r], momentum / step_.dt);
+  }
+}
+
 /// Supports' frames to the end of the step; whole turns of the twist angles follow.
 void IncrementalPotential::turnSupports() {
+  beyond_barrier_ = false;
   std::vector<double> turned(elements_.frames - dofs_.edges(), 0.0);
   bool any = false;
   for (std::size_t s = 0; s < scene_.supports.size(); ++s) {
@@ -76,6 +95,9 @@ void IncrementalPotential::turnSupports() {
     iterate_.turns[c] = 2 * pi * std::round((expected - principal) / (2 * pi));
     iterate_.twist[c] = principal + iterate_.turns[c];
   }
+  for (std::size_t r = 0; r < elements_.rods.size(); ++r)
+    if (elements_.measure[r] == Measure::tan)
+      for (int c = elements_.rod_cells[r]; c < elements_.rod_cells[r + 1]; ++c) beyond_barrier_ = beyond_barrier_ || iterate_.turns[c] != 0;
 }
 
 bool IncrementalPotential::remainingMotion(std::vector<double> &increment) const {
@@ -145,10 +167,10 @@ const Rows &IncrementalPotential::derivatives() {
   std::fill(rows_.band.begin(), rows_.band.end(), 0.0);
   // Stretch is the first term and adds to both residuals; what the others add is the same for both.
   std::fill(rows_.equilibrium.begin(), rows_.equilibrium.end(), 0.0);
-  for (std::size_t r = 0; r < elements_.rods.size(); ++r) terms_[0]->addDerivatives(iterate_, int(r), rows_);
+  for (std::size_t r = 0; r < elements_.rods.size(); ++r) terms_[0]->addDerivatives(iterate_, int(r), rows_, step_.hessian);
   for (std::size_t k = 0; k < rows_.gradient.size(); ++k) rows_.equilibrium[k] -= rows_.gradient[k];
   for (std::size_t t = 1; t < terms_.size(); ++t)
-    for (std::size_t r = 0; r < elements_.rods.size(); ++r) terms_[t]->addDerivatives(iterate_, int(r), rows_);
+    for (std::size_t r = 0; r < elements_.rods.size(); ++r) terms_[t]->addDerivatives(iterate_, int(r), rows_, step_.hessian);
   for (std::size_t k = 0; k < rows_.gradient.size(); ++k) rows_.equilibrium[k] += rows_.gradient[k];
   current_ = true;
   return rows_;
@@ -159,7 +181,7 @@ const std::vector<double> &IncrementalPotential::bandWithoutCompression() {
   uncompressed_.equilibrium.assign(rows_.gradient.size(), 0.0);
   uncompressed_.band.assign(rows_.band.size(), 0.0);
   for (const auto &term : terms_)
-    for (std::size_t r = 0; r < elements_.rods.size(); ++r) term->addDerivatives(iterate_, int(r), uncompressed_, Compression::dropped);
+    for (std::size_t r = 0; r < elements_.rods.size(); ++r) term->addDerivatives(iterate_, int(r), uncompressed_, step_.hessian == HessianKind::exact ? HessianKind::uncompressed : step_.hessian);
   return uncompressed_.band;
 }
 

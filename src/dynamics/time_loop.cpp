@@ -6,14 +6,20 @@
 
 namespace tendril {
 
+Step TimeLoop::stepOf(const LoopSettings &settings, const State &state, double dt) {
+  Step step;
+  step.dt = settings.dynamic ? dt : 0;
+  step.time = state.time + dt;
+  if (std::abs(step.time - settings.t_end) < 1e-9 * settings.dt) step.time = settings.t_end; // no sliver of a step from rounding
+  step.load_factor = settings.dynamic ? 1 : step.time;
+  step.mixed = settings.mixed;
+  step.hessian = settings.hessian;
+  return step;
+}
+
 PetscErrorCode TimeLoop::step(State &state, double dt, NewtonReport *report) {
   PetscFunctionBeginUser;
-  Step step;
-  step.dt = settings_.dynamic ? dt : 0;
-  step.time = state.time + dt;
-  if (std::abs(step.time - settings_.t_end) < 1e-9 * settings_.dt) step.time = settings_.t_end; // no sliver of a step from rounding
-  step.load_factor = settings_.dynamic ? 1 : step.time;
-  step.mixed = settings_.mixed;
+  const Step step = stepOf(settings_, state, dt);
   PetscCall(solver_.solve(state, step, report));
   if (report->converged) solver_.potential().commit(state);
   PetscFunctionReturn(0);
@@ -37,7 +43,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
       ++rejected;
       good = 0;
       dt = 0.5 * h;
-      if (dt >= dt_min) continue;
+      if (dt >= std::min(dt_min, (settings_.t_end - state.time) / 1024)) continue; // a short last step may be halved as often
       std::ostringstream message;
       message << (settings_.dynamic ? "step at time " : "load step at factor ") << state.time << " failed with " << (settings_.dynamic ? "dt " : "increment ") << h
               << ": " << report.reason << " (" << report.iterations << " iterations; residual " << report.residual.force << " of the load, "

@@ -53,8 +53,9 @@ public:
     return elements_.measure[rod] == Measure::tan ? sum<Measure::tan>(configuration, rod) : sum<Measure::angle>(configuration, rod);
   }
 
-  void addDerivatives(const Configuration &configuration, int rod, Rows &rows, Compression) const override {
-    elements_.measure[rod] == Measure::tan ? assemble<Measure::tan>(configuration, rod, rows) : assemble<Measure::angle>(configuration, rod, rows);
+  void addDerivatives(const Configuration &configuration, int rod, Rows &rows, HessianKind hessian) const override {
+    elements_.measure[rod] == Measure::tan ? assemble<Measure::tan>(configuration, rod, hessian, rows)
+                                           : assemble<Measure::angle>(configuration, rod, hessian, rows);
   }
 
 private:
@@ -96,14 +97,21 @@ private:
     return reduce(total);
   }
 
-  template <Measure measure> void assemble(const Configuration &configuration, int rod, Rows &rows) const {
+  template <Measure measure> void assemble(const Configuration &configuration, int rod, HessianKind hessian_kind, Rows &rows) const {
     const CellArrays &cells = elements_.cells;
     const int end = elements_.rod_cells[rod + 1];
     alignas(64) double gradient[cell_size][lanes], hessian[cell_pairs][lanes];
     for (int c = elements_.rod_cells[rod]; c < end; c += lanes) {
       const FrameOf<Pack> f0 = gatherFrames(configuration.frame.data(), &cells.frame0[c]), f1 = gatherFrames(configuration.frame.data(), &cells.frame1[c]);
       CellDerivatives<Pack> d;
-      cellDerivatives<measure>(f0, f1, loadCells<measure>(configuration, c), d);
+      CellOf<Pack> cell = loadCells<measure>(configuration, c);
+      cellDerivatives<measure>(f0, f1, cell, d);
+      if (hessian_kind == HessianKind::gauss_newton) { // the Hessian the cell would have if it were at rest as it is
+        const std::array<Pack, cell_size> gradient_now = d.gradient;
+        cell.rest = cellStrain<measure>(f0, f1, cell);
+        cellDerivatives<measure>(f0, f1, cell, d);
+        d.gradient = gradient_now;
+      }
       for (int k = 0; k < cell_size; ++k) d.gradient[k].copy_to(gradient[k], std::experimental::vector_aligned);
       for (int k = 0; k < cell_pairs; ++k) d.hessian[k].copy_to(hessian[k], std::experimental::vector_aligned);
       for (int lane = 0; lane < std::min(lanes, end - c); ++lane) addLane(gradient, hessian, lane, cells.row[c + lane], rows);

@@ -37,7 +37,7 @@ public:
     return 0.5 * weight_[r] * sum;
   }
 
-  void addDerivatives(const Configuration &c, int r, Rows &rows, Compression) const override {
+  void addDerivatives(const Configuration &c, int r, Rows &rows, HessianKind) const override {
     const RodRange &rod = elements_.rods[r];
     for (int v = rod.first_vertex; v < rod.first_vertex + rod.vertices; ++v) {
       const int row = elements_.vertex_row[v];

@@ -43,7 +43,7 @@ public:
     return sum;
   }
 
-  void addDerivatives(const Configuration &c, int r, Rows &rows, Compression) const override {
+  void addDerivatives(const Configuration &c, int r, Rows &rows, HessianKind) const override {
     const RodRange &rod = elements_.rods[r];
     for (int v = rod.first_vertex; v < rod.first_vertex + rod.vertices; ++v) {
       const Vec3 f = forceOn(r, v);

@@ -21,7 +21,7 @@ public:
     return sum;
   }
 
-  void addDerivatives(const Configuration &configuration, int r, Rows &rows, Compression compression) const override {
+  void addDerivatives(const Configuration &configuration, int r, Rows &rows, HessianKind hessian) const override {
     const RodRange &rod = elements_.rods[r];
     for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
       const Frame &f = configuration.frame[i];
@@ -29,7 +29,7 @@ public:
       const double primal = law_.stiffness[i] * (configuration.strain[i] - law_.rest[i]);
       const double force = mixed_ ? configuration.axial_force[i] : primal;
       const Vec3 g = stretchGradient(f, primal, inverse), e = stretchGradient(f, force, inverse);
-      const Mat3 h = stretchHessian(f, law_.stiffness[i], compression == Compression::dropped ? std::max(force, 0.0) : force, inverse);
+      const Mat3 h = stretchHessian(f, law_.stiffness[i], hessian == HessianKind::exact ? force : std::max(force, 0.0), inverse);
       const int row = elements_.edge_row[i], stride = rod.stride;
       for (int a = 0; a < 3; ++a) {
         rows.gradient[row + a] -= g[a];

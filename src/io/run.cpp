@@ -1,9 +1,8 @@
 #include "tendril/io/run.hpp"
 
 #include "tendril/dynamics/simulation.hpp"
+#include "tendril/io/options.hpp"
 #include "tendril/io/progress.hpp"
-#include "tendril/io/scene_reader.hpp"
-#include "tendril/io/yaml.hpp"
 #include "tendril/solver/events.hpp"
 
 #include <algorithm>
@@ -21,130 +20,6 @@ constexpr const char *usage =
     "tendril: elastic rods. Runs the scene given by -scene and writes a trajectory to -output_dir.\n"
     "  tendril -scene data/scenes/helix.yaml -dt 5e-3 -t_end 2 -output_dir out/helix\n"
     "Options of tendril are listed below; -snes_*, -ksp_*, -pc_*, -mat_* and -log_view are PETSc's (add -scene to list them with -help).\n";
-
-/// Everything that the command line says.
-struct Options {
-  std::string scene;
-  bool has_scene = false;
-  std::map<std::string, std::string> overrides;
-  LoopSettings loop;
-  bool has_mode = false, has_dt = false, has_t_end = false, has_load_steps = false, has_gravity = false;
-  int load_steps = 1;
-  Vec3 gravity = Vec3::Zero();
-  std::string output_dir = "out";
-  double output_interval = 0;
-  std::set<std::string> fields{TrajectoryWriter::fieldNames().begin(), TrajectoryWriter::fieldNames().end()};
-};
-
-[[noreturn]] void failOption(const std::string &option, const std::string &message) { throw SceneError("option " + option + ": " + message); }
-
-void requirePositive(const char *option, bool given, double value) {
-  if (given && !(value > 0 && std::isfinite(value))) failOption(option, "must be a finite number greater than zero, found " + std::to_string(value));
-}
-
-PetscErrorCode readOptions(Options *o) {
-  char text[PETSC_MAX_PATH_LEN];
-  PetscBool set, any;
-  PetscFunctionBeginUser;
-  PetscOptionsBegin(PETSC_COMM_WORLD, "", "Options of tendril", "docs/user.md");
-  PetscCall(PetscOptionsString("-scene", "scene file (YAML)", "", "", text, sizeof text, &set));
-  o->has_scene = set;
-  if (set) o->scene = text;
-  const char *modes[] = {"dynamic", "static"};
-  PetscInt choice = 0;
-  PetscCall(PetscOptionsEList("-mode", "steps in time, or in load to an equilibrium", "", modes, 2, modes[0], &choice, &set));
-  o->has_mode = set;
-  o->loop.dynamic = choice == 0;
-  PetscReal value = 0;
-  PetscCall(PetscOptionsReal("-dt", "time step [s]", "", o->loop.dt, &o->loop.dt, &set));
-  o->has_dt = set;
-  requirePositive("-dt", set, o->loop.dt);
-  PetscCall(PetscOptionsReal("-dt_min", "smallest step after rejections [s or load factor] (default: dt/1024)", "", 0, &o->loop.dt_min, &set));
-  requirePositive("-dt_min", set, o->loop.dt_min);
-  PetscCall(PetscOptionsReal("-t_end", "end time [s]", "", o->loop.t_end, &o->loop.t_end, &set));
-  o->has_t_end = set;
-  requirePositive("-t_end", set, o->loop.t_end);
-  PetscInt steps = 1;
-  PetscCall(PetscOptionsInt("-load_steps", "equal steps of the load factor from 0 to 1 (static)", "", steps, &steps, &set));
-  o->has_load_steps = set;
-  o->load_steps = int(steps);
-  if (set && steps < 1) failOption("-load_steps", "must be at least 1, found " + std::to_string(steps));
-  PetscReal gravity[3] = {0, 0, 0};
-  PetscInt count = 3;
-  PetscCall(PetscOptionsRealArray("-gravity", "acceleration of gravity, e.g. 0,-9.81,0 [m/s^2]", "", gravity, &count, &set));
-  o->has_gravity = set;
-  if (set && count != 3) failOption("-gravity", "needs three numbers, e.g. 0,-9.81,0");
-  o->gravity = Vec3(gravity[0], gravity[1], gravity[2]);
-  if (!o->gravity.allFinite()) failOption("-gravity", "must be finite");
-  PetscCall(PetscOptionsString("-output_dir", "folder for the results", "", "out", text, sizeof text, &set));
-  if (set) o->output_dir = text;
-  PetscCall(PetscOptionsReal("-output_interval", "time between frames: the first step at or after each multiple is written (0: every step) [s]", "", 0, &value, &set));
-  if (set && !(value >= 0 && std::isfinite(value))) failOption("-output_interval", "must not be negative");
-  o->output_interval = value;
-  PetscCall(PetscOptionsString("-output_fields", "fields of a frame: position,director,velocity,twist_rate,axial_force", "", "all", text, sizeof text, &set));
-  if (set) {
-    o->fields.clear();
-    std::istringstream in(text);
-    for (std::string word; std::getline(in, word, ',');) {
-      const auto &names = TrajectoryWriter::fieldNames();
-      if (std::find(names.begin(), names.end(), word) == names.end()) failOption("-output_fields", "there is no field '" + word + "'; choose from position,director,velocity,twist_rate,axial_force");
-      o->fields.insert(word);
-    }
-  }
-  const char *retractions[] = {"additive", "length"};
-  choice = 1;
-  PetscCall(PetscOptionsEList("-retraction", "how positions move: straight, or keeping the linearised lengths of the edges", "", retractions, 2, retractions[choice], &choice, &set));
-  o->loop.retraction = choice == 0 ? RetractionKind::additive : RetractionKind::length;
-  const char *stretches[] = {"primal", "mixed"};
-  choice = 1;
-  PetscCall(PetscOptionsEList("-stretch", "axial force from the strain, or as an unknown of its own", "", stretches, 2, stretches[choice], &choice, &set));
-  o->loop.mixed = choice == 1;
-  for (const auto &[name, meaning] : rodOverrides()) {
-    PetscCall(PetscOptionsString(("-rod_" + name).c_str(), (meaning + ", for every rod").c_str(), "", "from the scene", text, sizeof text, &set));
-    if (set) o->overrides[name] = text;
-  }
-  PetscOptionsEnd();
-  PetscCall(PetscOptionsHasName(nullptr, nullptr, "-options_left", &any));
-  PetscFunctionReturn(0);
-}
-
-/// Options nobody asked for are mistakes.
-PetscErrorCode refuseUnknownOptions() {
-  PetscInt n;
-  char **names, **values;
-  PetscFunctionBeginUser;
-  PetscCall(PetscOptionsLeftGet(nullptr, &n, &names, &values));
-  std::string unknown;
-  for (PetscInt i = 0; i < n; ++i) {
-    const std::string name = names[i];
-    const bool late = name.rfind("log_", 0) == 0 || name.rfind("options_", 0) == 0 || name.rfind("malloc", 0) == 0 || name == "help" || name.rfind("on_error", 0) == 0;
-    if (!late && unknown.empty()) unknown = name;
-  }
-  PetscCall(PetscOptionsLeftRestore(nullptr, &n, &names, &values));
-  if (!unknown.empty()) {
-    std::vector<std::string> known{"scene", "mode", "dt", "dt_min", "t_end", "load_steps", "gravity", "output_dir", "output_interval", "output_fields", "retraction", "stretch", "snes_rtol", "snes_max_it", "snes_monitor"};
-    for (const auto &o : rodOverrides()) known.push_back("rod_" + o.first);
-    const std::string near = closest(unknown, known);
-    throw SceneError("option -" + unknown + ": unknown or unused" + (near.empty() ? "" : "; did you mean -" + near + "?") + " (-help lists all options)");
-  }
-  PetscFunctionReturn(0);
-}
-
-/// Settings in force: the scene's `simulation` block, replaced by options.
-void resolve(const RunSettings &scene, Options &o) {
-  if (!o.has_mode) o.loop.dynamic = scene.mode == "dynamic";
-  if (!o.has_dt) o.loop.dt = scene.dt;
-  if (!o.has_t_end) o.loop.t_end = scene.t_end;
-  if (!o.has_load_steps) o.load_steps = scene.load_steps;
-  if (!o.loop.dynamic) {
-    if (o.has_dt) failOption("-dt", "has no meaning in -mode static; use -load_steps");
-    if (o.has_t_end) failOption("-t_end", "has no meaning in -mode static; the load factor ends at 1");
-    o.loop.t_end = 1;
-    o.loop.dt = 1.0 / o.load_steps;
-  } else if (o.has_load_steps)
-    failOption("-load_steps", "has no meaning in -mode dynamic; use -dt");
-  if (o.loop.dt_min > o.loop.dt) failOption("-dt_min", "must not be larger than the step " + std::to_string(o.loop.dt));
-}
 
 void makeFolder(const std::string &folder) {
   std::error_code error;
@@ -198,27 +73,21 @@ Provenance provenance(int argc, char **argv) {
   return p;
 }
 
-void writeOptionsFile(const Options &o, const Provenance &p, const Scene &scene) {
-  std::ofstream out(o.output_dir + "/options.yaml");
-  out << std::setprecision(17) << "# All that was in force in this run.\ncommand_line: \"" << p.command_line << "\"\ntendril_version: " << p.version << "\ngit_commit: " << p.git_commit
-      << "\nscene: " << o.scene << "\nmode: " << (o.loop.dynamic ? "dynamic" : "static") << "\n";
-  if (o.loop.dynamic)
-    out << "dt: " << o.loop.dt << "\nt_end: " << o.loop.t_end << "\n";
-  else
-    out << "load_steps: " << o.load_steps << "\n";
-  out << "dt_min: " << (o.loop.dt_min > 0 ? o.loop.dt_min : o.loop.dt / 1024) << "\ngravity: [" << scene.gravity[0] << ", " << scene.gravity[1] << ", " << scene.gravity[2] << "]\noutput_dir: "
-      << o.output_dir << "\noutput_interval: " << o.output_interval << "\nretraction: " << (o.loop.retraction == RetractionKind::length ? "length" : "additive")
-      << "\nstretch: " << (o.loop.mixed ? "mixed" : "primal") << "\noutput_fields: [";
-  for (auto f = o.fields.begin(); f != o.fields.end(); ++f) out << (f == o.fields.begin() ? "" : ", ") << *f;
-  out << "]\nrods:\n";
-  for (const Rod &rod : scene.rods) {
-    const Material &m = rod.material;
-    out << "  - {name: \"" << rod.name << "\", measure: " << (rod.measure == Measure::tan ? "tan" : "angle") << ", linear_density: " << m.linear_density << ", linear_rotational_inertia: " << m.linear_rotational_inertia
-        << ", axial_stiffness: " << m.axial_stiffness << ", torsional_stiffness: " << m.torsional_stiffness << ", flexural_stiffness: [" << m.flexural_stiffness[0] << ", " << m.flexural_stiffness[1]
-        << "], mass_damping_coefficient: " << m.mass_damping_coefficient << ", stiffness_damping_coefficient: " << m.stiffness_damping_coefficient << "}\n";
+/// While it lives, PETSc's errors are kept as one line instead of printed with their trace.
+class QuietErrors {
+public:
+  QuietErrors() { (void)PetscPushErrorHandler(keep, &message_); }
+  ~QuietErrors() { (void)PetscPopErrorHandler(); }
+  QuietErrors(const QuietErrors &) = delete;
+  const std::string &message() const { return message_; }
+
+private:
+  std::string message_;
+  static PetscErrorCode keep(MPI_Comm, int, const char *, const char *, PetscErrorCode code, PetscErrorType type, const char *text, void *message) {
+    if (type == PETSC_ERROR_INITIAL && text) *static_cast<std::string *>(message) = text;
+    return code;
   }
-  out << "petsc_options: \"" << p.options << "\"\n";
-}
+};
 
 /// A rod that nothing holds has no equilibrium to find.
 void requireHeld(const Scene &scene) {
@@ -232,10 +101,11 @@ PetscErrorCode setUp(Simulation &run, Options &o) {
   PetscFunctionBeginUser;
   PetscCall(PetscLogStagePush(events().setup));
   SceneFile file = readScene(o.scene, o.overrides);
-  if (o.has_gravity) file.scene.gravity = o.gravity;
+  if (o.gravity) file.scene.gravity = *o.gravity;
   resolve(file.run, o);
   if (!o.loop.dynamic) requireHeld(file.scene);
   PetscCall(run.setUp(std::move(file.scene), o.loop));
+  PetscCall(run.solver.rehearse(run.state, TimeLoop::stepOf(o.loop, run.state, o.loop.dt)));
   PetscCall(PetscLogStagePop());
   PetscFunctionReturn(0);
 }
@@ -243,20 +113,27 @@ PetscErrorCode setUp(Simulation &run, Options &o) {
 PetscErrorCode execute(int argc, char **argv, int *exit_code) {
   PetscFunctionBeginUser;
   Options o;
-  PetscCall(readOptions(&o));
-  PetscBool help;
-  PetscCall(PetscOptionsHasName(nullptr, nullptr, "-help", &help));
-  if (!o.has_scene) {
-    if (help) PetscFunctionReturn(0);
-    failOption("-scene", "is required: tendril -scene data/scenes/helix.yaml (-help lists all options)");
+  {
+    const QuietErrors errors;
+    if (readOptions(argc, argv, &o)) throw SceneError("command line: " + errors.message());
   }
+  if (o.scene.empty()) {
+    if (o.help) PetscFunctionReturn(0);
+    throw SceneError("option -scene: is required: tendril -scene data/scenes/helix.yaml (-help lists all options)");
+  }
+  int ranks;
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &ranks));
+  if (ranks > 1) throw SceneError("tendril runs on one process, found " + std::to_string(ranks) + "; start it without mpiexec");
   Simulation run;
-  PetscCall(setUp(run, o));
-  if (help) PetscFunctionReturn(0);
+  {
+    const QuietErrors errors;
+    if (setUp(run, o)) throw SceneError("setting up the solvers: " + errors.message());
+  }
+  if (o.help) PetscFunctionReturn(0);
   PetscCall(refuseUnknownOptions());
   makeFolder(o.output_dir);
   const Provenance origin = provenance(argc, argv);
-  writeOptionsFile(o, origin, run.scene);
+  writeOptionsFile(o.output_dir + "/options.yaml", o, origin, run.scene);
   Progress progress(o.loop.t_end, o.output_dir + "/log.txt");
   progress.say(origin.command_line);
   std::istringstream groups(groupsText(run.scene));
@@ -271,6 +148,7 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
   double next_output = o.output_interval;
   long steps = 0, iterations = 0, rejected = 0;
   double wall = 0;
+  bool warned = false;
   auto observe = [&](const State &state, const Diagnostics &row) -> PetscErrorCode {
     PetscFunctionBeginUser;
     PetscCall(PetscLogEventBegin(events().output, 0, 0, 0, 0));
@@ -287,6 +165,10 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
       while (o.output_interval > 0 && next_output <= state.time * (1 + 1e-12)) next_output += o.output_interval;
     }
     progress.step(row);
+    if (!o.loop.dynamic && row.negative_pivots > 0 && !warned) {
+      progress.say("warning: " + std::to_string(row.negative_pivots) + " negative pivots at an accepted state with couples: couples have no potential, so its stability is not known");
+      warned = true;
+    }
     PetscCall(PetscLogEventEnd(events().output, 0, 0, 0, 0));
     PetscFunctionReturn(0);
   };
@@ -322,7 +204,9 @@ int runMain(int argc, char **argv) {
     }();
     if (error) exit_code = 1;
   } catch (const std::exception &e) {
-    std::fprintf(stderr, "tendril: %s\n", e.what());
+    int rank;
+    MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
+    if (rank == 0) std::fprintf(stderr, "tendril: %s\n", e.what());
     exit_code = 1;
   }
   (void)PetscOptionsSetValue(nullptr, "-options_left", "no"); // checked before the first step, with better words

@@ -108,6 +108,13 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential) {
   PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGNATURAL));
   PetscCall(PCFactorSetZeroPivot(pc, 1e-250)); // for PETSc's own: pivots have the units of a stiffness, no absolute bound makes sense
   PetscCall(SNESSetFromOptions(snes_));
+  MatSolverType type;
+  PetscCall(PCFactorGetMatSolverType(pc, &type));
+  if (type && std::string(type) == MATSOLVERMUMPS) { // MUMPS counts pivots only when it looks for null ones
+    PetscBool given;
+    PetscCall(PetscOptionsHasName(nullptr, nullptr, "-mat_mumps_icntl_24", &given));
+    if (!given) PetscCall(PetscOptionsSetValue(nullptr, "-mat_mumps_icntl_24", "1"));
+  }
   PetscFunctionReturn(0);
 }
 
@@ -436,7 +443,7 @@ PetscErrorCode NewtonSolver::escapeSaddle(bool *left) {
   double best = potential_->energy(potential_->iterate()), best_scale = 0;
   for (const RetractionKind k : {RetractionKind::length, RetractionKind::additive}) {
     kind = k;
-    for (double scale = 1e-3; scale < 2; scale *= 2)
+    for (double scale = 1e-6; scale < 2; scale *= 2) // just past a branching of a stiff rod the other branch is that close
       for (const double s : {scale, -scale}) {
         const double energy = potential_->tryMove(increment_, s, trial_) ? potential_->energy(trial_) : HUGE_VAL;
         if (energy < best) {
@@ -488,15 +495,46 @@ PetscErrorCode NewtonSolver::newton(const char **failure) {
   PetscFunctionReturn(0);
 }
 
+/// A hint for failures next to an angle of 180 degrees between neighbouring edges, where energies grow without bound.
+std::string NewtonSolver::nearBarrier() const {
+  const Elements &e = potential_->elements();
+  const Configuration &c = potential_->iterate();
+  double twist = 0, turning = 0;
+  for (std::size_t r = 0; r < e.rods.size(); ++r)
+    for (int n = e.rod_cells[r]; n < e.rod_cells[r + 1]; ++n) {
+      if (e.measure[r] == Measure::tan) twist = std::max(twist, std::abs(c.twist[n]));
+      turning = std::max(turning, std::acos(std::clamp(c.frame[e.cells.frame0[n]].tangent.dot(c.frame[e.cells.frame1[n]].tangent), -1.0, 1.0)));
+    }
+  constexpr double near = 150, degrees = 180 / pi;
+  std::string hint;
+  if (twist * degrees > near)
+    hint += "; neighbouring edges are twisted by " + std::to_string(int(twist * degrees)) + " degrees, and measure tan has a barrier at 180: use more edges, or measure: angle";
+  if (turning * degrees > near) hint += "; neighbouring edges are folded by " + std::to_string(int(turning * degrees)) + " degrees of at most 180: use more edges";
+  return hint;
+}
+
+/// Factors once before the first step, so that mistakes in solver options come to light in time.
+PetscErrorCode NewtonSolver::rehearse(const State &start, const Step &step) {
+  int negative;
+  PetscFunctionBeginUser;
+  potential_->beginStep(start, step);
+  PetscCall(inertiaAtIterate(&negative));
+  report_ = {};
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode NewtonSolver::solve(const State &start, const Step &step, NewtonReport *report, const std::vector<double> *guess) {
-  const char *failure;
+  const char *failure = nullptr;
   PetscFunctionBeginUser;
   report_ = {};
   sharpness_ = 1;
   potential_->beginStep(start, step);
   if (guess) potential_->moveTo(*guess);
   energy_known_ = false;
-  PetscCall(newton(&failure));
+  if (potential_->beyondBarrier())
+    failure = "a support turns past the barrier of measure tan at 180 degrees of twist per vertex; use more edges, or measure: angle";
+  else
+    PetscCall(newton(&failure));
   // In statics the answer must be a minimum.
   for (int k = 0; step.isStatic() && !failure; ++k) {
     PetscCall(inertiaAtIterate(&report_.negative_pivots));
@@ -512,7 +550,7 @@ PetscErrorCode NewtonSolver::solve(const State &start, const Step &step, NewtonR
     PetscCall(newton(&failure));
   }
   report_.converged = !failure;
-  report_.reason = failure ? failure : "converged";
+  report_.reason = failure ? failure + nearBarrier() : "converged";
   *report = report_;
   PetscFunctionReturn(0);
 }

@@ -143,8 +143,8 @@ bool Retraction::updateFrames(const Configuration &from, const std::vector<doubl
     to.strain[i] = axialStrain(length, elements_.inverse_rest_length[i]);
     to.spin[i] = from.spin[i] + angle;
   }
-  if (elements_.measure[r] != Measure::angle) return true;
-  // Whole turns of the twist angle by continuity: the angle moves by the difference of the two spins, and by a little holonomy.
+  // Whole turns of the twist angle by continuity: the angle moves by the difference of the two spins, and by a little holonomy. Half a turn
+  // is a barrier of the measure `tan`: no step leads across it.
   const CellArrays &cells = elements_.cells;
   const int ne = int(to.spin.size());
   auto turning = [&](int frame) { return frame < ne ? to.spin[frame] - from.spin[frame] : 0.0; };
@@ -152,6 +152,7 @@ bool Retraction::updateFrames(const Configuration &from, const std::vector<doubl
     const double expected = from.twist[c] + turning(cells.frame1[c]) - turning(cells.frame0[c]);
     const double principal = halfAngleBetween(to.frame[cells.frame0[c]], to.frame[cells.frame1[c]]).angle();
     to.turns[c] = 2 * pi * std::round((expected - principal) / (2 * pi));
+    if (elements_.measure[r] == Measure::tan && to.turns[c] != 0) return false;
     to.twist[c] = principal + to.turns[c];
   }
   return true;

@@ -25,6 +25,40 @@ Scene springScene(int edges = 40) {
   return scene;
 }
 
+/// A tolerance relative to EI/L^2 alone would accept standing still: its forces exceed those of so light a rod's inertia.
+TEST(FreeFlight, OfASlowLightRodKeepsItsVelocity) {
+  Rod rod = straightRod(10, Measure::tan, 1e-4);
+  rod.material = homogeneousMaterial({SectionShape::circle, {1e-6, 1e-6}}, 1e9, 4e8, 1000);
+  rod.initial_velocity = Vec3(1e-3, 0, 0);
+  Simulation sim;
+  runTo(sim, freeScene(rod), dynamics(1e-3, 1e-2));
+  for (const Vec3 &v : sim.state.velocity) EXPECT_NEAR(v[0], 1e-3, 1.1e-7); // ten steps, each to 1e-6 of the momentum of eleven vertices
+}
+
+TEST(TwistBarrier, IsNotSteppedOver) {
+  for (const Measure measure : {Measure::tan, Measure::angle}) {
+    Rod rod = straightRod(4, measure);
+    rod.material.flexural_stiffness = {1e8, 1e8}; // too stiff to writhe
+    Scene scene = clampedScene(rod);
+    scene.supports.push_back(hold(scene, 0, 4, Support::Kind::clamp));
+    scene.supports[1].motion.angular_velocity = Vec3(30, 0, 0); // rad at load factor 1: 7.5 per cell
+    Simulation sim;
+    const LoopSettings settings = statics(20);
+    EXPECT_PETSC(sim.setUp(scene, settings));
+    TimeLoop loop(sim.solver, settings);
+    bool finished;
+    EXPECT_PETSC(loop.run(sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+    EXPECT_EQ(finished, measure == Measure::angle) << loop.failure() << sim.state.time;
+    if (measure == Measure::angle) {
+      const EnergyBudget e = energyBudget(sim.scene, *sim.elements, sim.state, 1);
+      EXPECT_NEAR(e.twist, 0.5 * rod.material.torsional_stiffness * 30 * 30, 1e-9 * e.twist); // GJ phi^2/(2 L), exact for uniform twist
+    } else {
+      EXPECT_LT(sim.state.time, 5 * pi / 30); // three cells and two half cells, each below 180 degrees
+      EXPECT_NE(loop.failure().find("barrier"), std::string::npos) << loop.failure();
+    }
+  }
+}
+
 TEST(FreeFall, IsBackwardEulersOwnSum) {
   Scene scene = freeScene(straightRod(10));
   scene.rods[0].initial_velocity = Vec3(1, 2, 0);

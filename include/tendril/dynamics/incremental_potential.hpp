@@ -15,6 +15,8 @@ public:
 
   /// Starts a step: the iterate is the start state with supports' frames (not yet their positions) moved to the end of the step.
   void beginStep(const State &start, const Step &step);
+  /// Whether a support has turned its edge past 180 degrees of twist in one step, where the measure `tan` has its barrier.
+  bool beyondBarrier() const { return beyond_barrier_; }
   const Configuration &iterate() const { return iterate_; }
   const Step &step() const { return step_; }
   const Scene &scene() const { return scene_; }
@@ -70,9 +72,11 @@ private:
   Rows rows_;
   bool current_ = false; ///< rows_ belong to the iterate
   Rows uncompressed_;
-  std::vector<double> force_scale_, length_;
+  std::vector<double> load_, force_scale_, length_; ///< per rod: loads [N], or 0; the present scale of forces [N]
+  bool beyond_barrier_ = false;
 
   void turnSupports();
+  void setForceScales();
 };
 
 } // namespace tendril

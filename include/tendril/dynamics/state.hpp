@@ -33,7 +33,7 @@ struct Configuration {
   std::vector<double> strain;
   std::vector<double> spin;        ///< (ne) turning of each director since the step began, summed over retractions [rad]
   std::vector<double> turns;       ///< as in State
-  std::vector<double> twist;       ///< (cells) twist angle with whole turns, `angle` measure only [rad]
+  std::vector<double> twist;       ///< (cells) twist angle with whole turns [rad]
   std::vector<double> axial_force; ///< (ne) [N]
 };
 

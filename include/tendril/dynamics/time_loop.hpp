@@ -13,6 +13,7 @@ struct LoopSettings {
   bool dynamic = true;
   double dt = 1e-2, dt_min = 0, t_end = 1; ///< in statics time is the load factor and ends at 1
   bool mixed = true;
+  HessianKind hessian = HessianKind::exact;
   RetractionKind retraction = RetractionKind::length;
 };
 
@@ -24,6 +25,8 @@ public:
 
   /// Advances `state` to the end. `finished` is false when dt_min was reached; `state` is then the last one accepted, bit for bit.
   PetscErrorCode run(State &state, const Observer &observe, bool *finished);
+  /// The step of length `dt` [s, or load factor] that follows a state.
+  static Step stepOf(const LoopSettings &settings, const State &state, double dt);
   const std::string &failure() const { return failure_; }
 
 private:

@@ -9,12 +9,17 @@
 
 namespace tendril {
 
+/// Which second derivatives a Hessian holds: all of them; without the compression of edges, which cannot make it indefinite then; or without the
+/// second derivatives of the strains and without compression (what other codes use: slower, never indefinite; for comparison).
+enum class HessianKind { exact, uncompressed, gauss_newton };
+
 /// One step to be taken: from the start state to `time`.
 struct Step {
   double dt = 0;          ///< [s]; 0 in statics
   double time = 0;        ///< at the end of the step: prescribed motions are at this time [s]
   double load_factor = 1; ///< on gravity, forces, torques and moments
   bool mixed = true;      ///< axial force as its own unknown, condensed edge by edge
+  HessianKind hessian = HessianKind::exact;
   bool isStatic() const { return dt == 0; }
 };
 
@@ -22,9 +27,6 @@ struct Step {
 struct Rows {
   std::vector<double> gradient, equilibrium, band;
 };
-
-/// What the compression of edges adds to the Hessian: kept is exact; dropped leaves a Hessian that compression cannot make indefinite.
-enum class Compression { kept, dropped };
 
 class Term {
 public:
@@ -36,7 +38,7 @@ public:
   /// [J], up to a constant of the step. Not finite where the configuration is impossible.
   virtual double energy(const Configuration &configuration, int rod) const = 0;
   /// Adds gradient and Hessian, pulled back by the retraction at the configuration.
-  virtual void addDerivatives(const Configuration &configuration, int rod, Rows &rows, Compression compression = Compression::kept) const = 0;
+  virtual void addDerivatives(const Configuration &configuration, int rod, Rows &rows, HessianKind hessian = HessianKind::exact) const = 0;
 };
 
 /// Axial force of every edge as a linear law of its strain over one step: stiffness (strain - rest), dissipation included.

@@ -29,6 +29,8 @@ public:
   /// Minimises the potential of the step. The potential's iterate is the answer when `report` says converged.
   /// \param guess rows of displacements and spins to start from instead of the start state
   PetscErrorCode solve(const State &start, const Step &step, NewtonReport *report, const std::vector<double> *guess = nullptr);
+  /// Sets the linear solver up as a step would, so that its options have been asked for before the first step.
+  PetscErrorCode rehearse(const State &start, const Step &step);
   /// Factors the Hessian at the iterate and counts negative pivots.
   PetscErrorCode inertiaAtIterate(int *negative);
 
@@ -63,6 +65,7 @@ private:
   PetscErrorCode shiftUntilPositive(KSP ksp, Vec f, Vec y, int negative, bool regular);
   PetscErrorCode includeMotion(KSP ksp, Vec f, Vec y);
   PetscErrorCode escapeSaddle(bool *left);
+  std::string nearBarrier() const;
 };
 
 /// Registers the line search type `retraction`; call after PetscInitialize.

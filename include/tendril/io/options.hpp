@@ -1,0 +1,41 @@
+#pragma once
+/// \file options.hpp
+/// The command line: options of our own, listed by -help and read as text, so that a mistake is told in one line.
+
+#include "tendril/dynamics/time_loop.hpp"
+#include "tendril/io/scene_reader.hpp"
+
+#include <optional>
+#include <set>
+
+namespace tendril {
+
+/// What is in force in a run: the command line over the scene's `simulation` block.
+struct Options {
+  std::string scene; ///< empty when not given
+  bool help = false;
+  std::optional<std::string> mode; ///< these four as given; `loop` holds what is in force
+  std::optional<double> dt, t_end;
+  std::optional<int> given_load_steps;
+  Overrides overrides;
+  LoopSettings loop;
+  int load_steps = 1;
+  std::optional<Vec3> gravity;
+  std::string output_dir = "out";
+  double output_interval = 0;
+  std::set<std::string> fields;
+};
+
+/// Reads our options from PETSc's data base. \throws SceneError naming the option.
+PetscErrorCode readOptions(int argc, char **argv, Options *options);
+
+/// Fills `loop` and what the command line leaves open from the scene. \throws SceneError
+void resolve(const RunSettings &scene, Options &options);
+
+/// Refuses options that nobody has asked for; call when the solvers are set up. \throws SceneError
+PetscErrorCode refuseUnknownOptions();
+
+/// Writes all that is in force, PETSc's options included, as YAML.
+void writeOptionsFile(const std::string &path, const Options &options, const Provenance &provenance, const Scene &scene);
+
+} // namespace tendril

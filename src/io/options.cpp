@@ -1,0 +1,264 @@
+#include "tendril/io/options.hpp"
+
+#include "tendril/io/yaml.hpp"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cctype>
+#include <fstream>
+#include <sstream>
+
+namespace tendril {
+namespace {
+
+/// An option of ours. Where `fallback` begins with a bracket it is a description, not a value.
+struct Entry {
+  std::string name, meaning, fallback;
+};
+
+const std::vector<Entry> &entries() {
+  static const std::vector<Entry> list = [] {
+    std::vector<Entry> l{
+        {"scene", "scene file (YAML)", "(required)"},
+        {"mode", "dynamic: steps in time; static: steps in load to an equilibrium", "(from the scene) dynamic"},
+        {"dt", "time step [s]", "(from the scene) 0.01"},
+        {"dt_min", "smallest step after rejections [s, or load factor]", "(dt/1024)"},
+        {"t_end", "end time [s]", "(from the scene) 1"},
+        {"load_steps", "equal steps of the load factor from 0 to 1 (static)", "(from the scene) 1"},
+        {"gravity", "acceleration of gravity, e.g. 0,-9.81,0 [m/s^2]", "(from the scene)"},
+        {"output_dir", "folder for the results", "out"},
+        {"output_interval", "time between frames: the first step at or after each multiple is written; 0: every step [s]", "0"},
+        {"output_fields", "fields of a frame besides the position: director,velocity,twist_rate,axial_force", "all"},
+        {"retraction", "how positions move: additive (straight), or length (keeping the linearised lengths of the edges)", "length"},
+        {"stretch", "axial force: primal (from the strain), or mixed (an unknown of its own)", "mixed"},
+        {"hessian", "exact, or gauss_newton (without second derivatives of the strains; for comparison)", "exact"},
+    };
+    for (const auto &[name, meaning] : rodOverrides()) l.push_back({"rod_" + name, meaning + ", for every rod", "(from the scene)"});
+    return l;
+  }();
+  return list;
+}
+
+[[noreturn]] void fail(const std::string &option, const std::string &message) { throw SceneError("option -" + option + ": " + message); }
+
+/// Our options as text.
+class Texts {
+public:
+  PetscErrorCode read() {
+    char text[PETSC_MAX_PATH_LEN];
+    PetscBool set;
+    PetscFunctionBeginUser;
+    PetscOptionsBegin(PETSC_COMM_WORLD, "", "Options of tendril", "docs/user.md");
+    for (const Entry &e : entries()) {
+      PetscCall(PetscOptionsString(("-" + e.name).c_str(), e.meaning.c_str(), "", e.fallback.c_str(), text, sizeof text, &set));
+      if (set) given_[e.name] = text;
+    }
+    PetscOptionsEnd();
+    for (const auto &[name, text_given] : given_)
+      if (text_given.empty()) fail(name, "needs a value");
+    PetscFunctionReturn(0);
+  }
+
+  bool has(const std::string &name) const { return given_.count(name) > 0; }
+  const std::string &at(const std::string &name) const { return given_.at(name); }
+
+  double number(const std::string &name) const {
+    const std::vector<double> v = numbers(name);
+    if (v.size() != 1) fail(name, "needs one number, found '" + at(name) + "'");
+    return v[0];
+  }
+
+  double positive(const std::string &name) const {
+    const double value = number(name);
+    if (!(value > 0)) fail(name, "must be greater than zero, found '" + at(name) + "'");
+    return value;
+  }
+
+  std::vector<double> numbers(const std::string &name) const {
+    std::vector<double> values;
+    std::istringstream in(at(name));
+    for (std::string word; std::getline(in, word, ',');) {
+      std::size_t used = 0;
+      double value = 0;
+      try {
+        value = std::stod(word, &used);
+      } catch (const std::exception &) {
+      }
+      if (used == 0 || used != word.size()) fail(name, "'" + word + "' is not a number");
+      if (!std::isfinite(value)) fail(name, "must be finite, found '" + word + "'");
+      values.push_back(value);
+    }
+    return values;
+  }
+
+  std::string oneOf(const std::string &name, const std::vector<std::string> &choices) const {
+    const std::string &value = at(name);
+    if (std::find(choices.begin(), choices.end(), value) != choices.end()) return value;
+    std::string all;
+    for (const std::string &c : choices) all += (all.empty() ? "" : ", ") + c;
+    const std::string near = closest(value, choices);
+    fail(name, "must be one of " + all + "; found '" + value + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?"));
+  }
+
+private:
+  std::map<std::string, std::string> given_;
+};
+
+std::set<std::string> readFields(const Texts &texts) {
+  const auto &names = TrajectoryWriter::fieldNames();
+  if (!texts.has("output_fields") || texts.at("output_fields") == "all") return {names.begin(), names.end()};
+  std::set<std::string> fields;
+  std::istringstream in(texts.at("output_fields"));
+  for (std::string word; std::getline(in, word, ',');) {
+    if (std::find(names.begin(), names.end(), word) == names.end()) {
+      std::string all;
+      for (const std::string &n : names) all += (all.empty() ? "" : ",") + n;
+      fail("output_fields", "there is no field '" + word + "'; choose from " + all);
+    }
+    fields.insert(word);
+  }
+  return fields;
+}
+
+/// Prefixes of PETSc's options that are asked for only when the program ends.
+constexpr const char *late_options[] = {"log_", "options_", "malloc", "help", "on_error"};
+
+bool isOptionName(const char *word) { return word[0] == '-' && (std::isalpha(static_cast<unsigned char>(word[1])) || word[1] == '-'); }
+
+} // namespace
+
+PetscErrorCode readOptions(int argc, char **argv, Options *o) {
+  PetscBool set;
+  PetscFunctionBeginUser;
+  for (int i = 1; i < argc; ++i)
+    if (!isOptionName(argv[i]) && (i == 1 || !isOptionName(argv[i - 1])))
+      throw SceneError(std::string("command line: '") + argv[i] + "' belongs to no option; options begin with - and take one value (lists without blanks)");
+  Texts texts;
+  PetscCall(texts.read());
+  PetscCall(PetscOptionsHasName(nullptr, nullptr, "-help", &set));
+  o->help = set;
+  if (texts.has("scene")) o->scene = texts.at("scene");
+  if (texts.has("mode")) o->mode = texts.oneOf("mode", {"dynamic", "static"});
+  if (texts.has("dt")) o->dt = texts.positive("dt");
+  if (texts.has("t_end")) o->t_end = texts.positive("t_end");
+  if (texts.has("dt_min")) o->loop.dt_min = texts.positive("dt_min");
+  if (texts.has("load_steps")) {
+    const double n = texts.number("load_steps");
+    if (!(n >= 1 && n <= 1e9 && n == std::floor(n))) fail("load_steps", "must be a whole number of at least 1, found '" + texts.at("load_steps") + "'");
+    o->given_load_steps = int(n);
+  }
+  if (texts.has("gravity")) {
+    const std::vector<double> g = texts.numbers("gravity");
+    if (g.size() != 3) fail("gravity", "needs three numbers, e.g. 0,-9.81,0; found '" + texts.at("gravity") + "'");
+    o->gravity = Vec3(g[0], g[1], g[2]);
+  }
+  if (texts.has("output_dir")) o->output_dir = texts.at("output_dir");
+  if (texts.has("output_interval")) {
+    o->output_interval = texts.number("output_interval");
+    if (o->output_interval < 0) fail("output_interval", "must not be negative, found '" + texts.at("output_interval") + "'");
+  }
+  o->fields = readFields(texts);
+  if (texts.has("retraction"))
+    o->loop.retraction = texts.oneOf("retraction", {"additive", "length"}) == "additive" ? RetractionKind::additive : RetractionKind::length;
+  if (texts.has("stretch")) o->loop.mixed = texts.oneOf("stretch", {"primal", "mixed"}) == "mixed";
+  if (texts.has("hessian")) o->loop.hessian = texts.oneOf("hessian", {"exact", "gauss_newton"}) == "exact" ? HessianKind::exact : HessianKind::gauss_newton;
+  for (const auto &[name, meaning] : rodOverrides())
+    if (texts.has("rod_" + name)) o->overrides[name] = texts.at("rod_" + name);
+  PetscReal rtol = 1;
+  PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-snes_rtol", &rtol, nullptr));
+  if (!(rtol > 0 && rtol <= 1)) fail("snes_rtol", "must be above 0 and at most 1: it is relative to the loads of each rod");
+  PetscFunctionReturn(0);
+}
+
+void resolve(const RunSettings &scene, Options &o) {
+  o.loop.dynamic = o.mode.value_or(scene.mode) == "dynamic";
+  o.load_steps = o.given_load_steps.value_or(scene.load_steps);
+  if (o.loop.dynamic) {
+    if (o.given_load_steps) fail("load_steps", "has no meaning in -mode dynamic; use -dt");
+    o.loop.dt = o.dt.value_or(scene.dt);
+    o.loop.t_end = o.t_end.value_or(scene.t_end);
+    if (o.loop.t_end / o.loop.dt > 1e12)
+      fail("dt", "a step of " + std::to_string(o.loop.dt) + " s never reaches the end at " + std::to_string(o.loop.t_end) + " s; write a larger dt or a smaller t_end");
+  } else {
+    if (o.dt) fail("dt", "has no meaning in -mode static; use -load_steps");
+    if (o.t_end) fail("t_end", "has no meaning in -mode static; the load factor ends at 1");
+    o.loop.t_end = 1;
+    o.loop.dt = 1.0 / o.load_steps;
+  }
+  if (o.loop.dt_min > o.loop.dt) fail("dt_min", "must not be larger than the step " + std::to_string(o.loop.dt));
+}
+
+PetscErrorCode refuseUnknownOptions() {
+  PetscInt n;
+  char **names, **values;
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsLeftGet(nullptr, &n, &names, &values));
+  std::string unknown;
+  for (PetscInt i = 0; i < n; ++i) {
+    const std::string name = names[i];
+    const bool late = std::any_of(std::begin(late_options), std::end(late_options), [&](const char *p) { return name.rfind(p, 0) == 0; });
+    if (!late && unknown.empty()) unknown = name;
+  }
+  PetscCall(PetscOptionsLeftRestore(nullptr, &n, &names, &values));
+  if (unknown.empty()) PetscFunctionReturn(0);
+  std::vector<std::string> known{"snes_rtol", "snes_max_it", "snes_monitor", "log_view"};
+  for (const Entry &e : entries()) known.push_back(e.name);
+  const std::string near = closest(unknown, known);
+  fail(unknown, "unknown or unused" + (near.empty() ? "" : "; did you mean -" + near + "?") + " (-help lists all options)");
+}
+
+void writeOptionsFile(const std::string &path, const Options &o, const Provenance &p, const Scene &scene) {
+  YAML::Emitter out;
+  out.SetDoublePrecision(17);
+  auto list = [&](auto begin, auto end) {
+    out << YAML::Flow << YAML::BeginSeq;
+    for (auto k = begin; k != end; ++k) out << *k;
+    out << YAML::EndSeq;
+  };
+  auto put = [&](const char *key, const auto &value) { out << YAML::Key << key << YAML::Value << value; };
+  out << YAML::Comment("All that was in force in this run.") << YAML::BeginMap;
+  put("command_line", p.command_line);
+  put("tendril_version", p.version);
+  put("git_commit", p.git_commit);
+  put("petsc_version", p.petsc_version);
+  put("scene", o.scene);
+  put("mode", o.loop.dynamic ? "dynamic" : "static");
+  if (o.loop.dynamic) {
+    put("dt", o.loop.dt);
+    put("t_end", o.loop.t_end);
+  } else
+    put("load_steps", o.load_steps);
+  put("dt_min", o.loop.dt_min > 0 ? o.loop.dt_min : o.loop.dt / 1024);
+  out << YAML::Key << "gravity" << YAML::Value;
+  list(scene.gravity.data(), scene.gravity.data() + 3);
+  put("output_dir", o.output_dir);
+  put("output_interval", o.output_interval);
+  out << YAML::Key << "output_fields" << YAML::Value;
+  list(o.fields.begin(), o.fields.end());
+  put("retraction", o.loop.retraction == RetractionKind::length ? "length" : "additive");
+  put("stretch", o.loop.mixed ? "mixed" : "primal");
+  put("hessian", o.loop.hessian == HessianKind::exact ? "exact" : "gauss_newton");
+  out << YAML::Key << "rods" << YAML::Value << YAML::BeginSeq;
+  for (const Rod &rod : scene.rods) {
+    const Material &m = rod.material;
+    out << YAML::BeginMap;
+    put("name", rod.name);
+    put("measure", rod.measure == Measure::tan ? "tan" : "angle");
+    put("linear_density", m.linear_density);
+    put("linear_rotational_inertia", m.linear_rotational_inertia);
+    put("axial_stiffness", m.axial_stiffness);
+    put("torsional_stiffness", m.torsional_stiffness);
+    out << YAML::Key << "flexural_stiffness" << YAML::Value;
+    list(m.flexural_stiffness.begin(), m.flexural_stiffness.end());
+    put("mass_damping_coefficient", m.mass_damping_coefficient);
+    put("stiffness_damping_coefficient", m.stiffness_damping_coefficient);
+    out << YAML::EndMap;
+  }
+  out << YAML::EndSeq;
+  put("petsc_options", p.options);
+  out << YAML::EndMap;
+  std::ofstream(path) << out.c_str() << "\n";
+}
+
+} // namespace tendril
