@@ -35,6 +35,22 @@ TEST(FreeFlight, OfASlowLightRodKeepsItsVelocity) {
   for (const Vec3 &v : sim.state.velocity) EXPECT_NEAR(v[0], 1e-3, 1.1e-7); // ten steps, each to 1e-6 of the momentum of eleven vertices
 }
 
+/// A clamp that travels by a table and turns, in both modes: the vertex is where the table says, and the edge beside it follows its frame.
+TEST(Motion, OfAClampIsFollowedExactly) {
+  for (const bool dynamic : {false, true}) {
+    Scene scene = clampedScene(straightRod(20));
+    scene.rods[0].material.mass_damping_coefficient = 1e3; // dynamics without waves
+    Motion &motion = scene.supports[0].motion;
+    motion.table = {{0, Vec3::Zero(), Vec3::Zero()}, {0.5, Vec3(0.1, 0.2, 0), Vec3(0, 0, 0.4)}, {1, Vec3(0.3, 0.2, 0.1), Vec3(0, 0, 1.2)}};
+    Simulation sim;
+    runTo(sim, scene, dynamic ? dynamics(0.02, 1) : statics(7)); // 7: the break of the table lies inside a load step
+    EXPECT_LT((sim.state.position[0] - Vec3(0.3, 0.2, 0.1)).norm(), 1e-15);
+    if (dynamic) continue; // the rod bends behind the clamp
+    const Vec3 axis(std::cos(1.2), std::sin(1.2), 0);
+    for (int v = 0; v <= 20; ++v) EXPECT_LT((sim.state.position[v] - sim.state.position[0] - axis * (v / 20.0)).norm(), 1e-7); // residual 1e-6 of EI/L^2
+  }
+}
+
 TEST(TwistBarrier, IsNotSteppedOver) {
   for (const Measure measure : {Measure::tan, Measure::angle}) {
     Rod rod = straightRod(4, measure);
