@@ -308,6 +308,7 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   PetscCall(PetscLogEventBegin(events().line_search, 0, 0, 0, 0));
   if (!energy_known_) energy_ = potential_->energy(potential_->iterate());
   const double noise = potential_->energyNoise(potential_->iterate());
+  const double energy_before = energy_;
   double lambda = 1;
   bool accepted = false;
   for (int trial = 0; trial < most_trials && !accepted; ++trial) {
@@ -324,10 +325,23 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
       energy_ = energy;
       break;
     }
-    // Minimum of the parabola through both energies and the slope, kept within a tenth and a half.
+    // Minimum of the parabola through both energies and the slope, kept within a fifth and a half.
     const double curvature = energy - energy_ - lambda * slope;
     const double best = std::isfinite(energy) && curvature > 0 ? -slope * lambda * lambda / (2 * curvature) : 0.5 * lambda;
-    lambda = std::clamp(best, 0.1 * lambda, 0.5 * lambda);
+    lambda = std::clamp(best, 0.2 * lambda, 0.5 * lambda);
+  }
+  // A full step that gained clearly more than a quadratic would: the minimum lies beyond, as on the way down from a barrier.
+  const double gain = (energy_ - energy_before) / slope;
+  if (accepted && lambda == 1 && gain > 0.6 && gain < 1) {
+    std::swap(trial_, shorter_);
+    const double longer = std::min(2.0, 0.5 / (1 - gain));
+    const double energy = potential_->tryMove(increment_, longer, trial_) ? potential_->energy(trial_) : HUGE_VAL;
+    ++report_.trials;
+    if (energy < energy_) {
+      energy_ = energy;
+      lambda = longer;
+    } else
+      std::swap(trial_, shorter_);
   }
   PetscCall(PetscLogEventEnd(events().line_search, 0, 0, 0, 0));
   PetscCall(SNESLineSearchSetLambda(search, lambda));
@@ -523,13 +537,33 @@ PetscErrorCode NewtonSolver::rehearse(const State &start, const Step &step) {
   PetscFunctionReturn(0);
 }
 
+/// Starts from where the velocities lead when that is lower than the start.
+void NewtonSolver::predict(const State &start, const Step &step) {
+  const Elements &e = potential_->elements();
+  const auto &unknown = potential_->dofs().unknownOfRow();
+  increment_.assign(potential_->dofs().rows(), 0.0);
+  for (std::size_t v = 0; v < start.velocity.size(); ++v)
+    for (int a = 0; a < 3; ++a)
+      if (unknown[e.vertex_row[v] + a] >= 0) increment_[e.vertex_row[v] + a] = step.dt * start.velocity[v][a];
+  for (const RodRange &rod : e.rods) {
+    if (rod.stride == 4)
+      for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) increment_[e.edge_row[i] + 3] = step.dt * start.twist_rate[i];
+    if (rod.closed) std::copy_n(&increment_[rod.first_row], rod.stride + 3, &increment_[rod.first_row + rod.rows]);
+  }
+  if (!potential_->tryMove(increment_, 1, trial_)) return;
+  if (potential_->energy(trial_) < potential_->energy(potential_->iterate())) potential_->accept(trial_);
+}
+
 PetscErrorCode NewtonSolver::solve(const State &start, const Step &step, NewtonReport *report, const std::vector<double> *guess) {
   const char *failure = nullptr;
   PetscFunctionBeginUser;
   report_ = {};
   sharpness_ = 1;
   potential_->beginStep(start, step);
-  if (guess) potential_->moveTo(*guess);
+  if (guess)
+    potential_->moveTo(*guess);
+  else if (!step.isStatic())
+    predict(start, step);
   energy_known_ = false;
   if (potential_->beyondBarrier())
     failure = "a support turns past the barrier of measure tan at 180 degrees of twist per vertex; use more edges, or measure: angle";

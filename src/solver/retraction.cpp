@@ -3,6 +3,17 @@
 #include "tendril/energy/edge.hpp"
 
 namespace tendril {
+namespace {
+
+/// Whether two edges folded by more than a right angle are on the other side of 180 degrees afterwards: their binormal, seen from the first edge's
+/// frame, has turned round.
+bool crossesFold(const Frame &a0, const Frame &b0, const Frame &a1, const Frame &b1) {
+  if (a0.tangent.dot(b0.tangent) > 0 || a1.tangent.dot(b1.tangent) > 0) return false;
+  const Vec3 before = a0.tangent.cross(b0.tangent), after = a1.tangent.cross(b1.tangent);
+  return before.dot(a0.director) * after.dot(a1.director) + before.dot(a0.secondDirector()) * after.dot(a1.secondDirector()) < 0;
+}
+
+} // namespace
 
 Retraction::Retraction(const Elements &elements, const DofMap &dofs) : elements_(elements) {
   held_.resize(dofs.vertices());
@@ -152,7 +163,8 @@ bool Retraction::updateFrames(const Configuration &from, const std::vector<doubl
     const double expected = from.twist[c] + turning(cells.frame1[c]) - turning(cells.frame0[c]);
     const double principal = halfAngleBetween(to.frame[cells.frame0[c]], to.frame[cells.frame1[c]]).angle();
     to.turns[c] = 2 * pi * std::round((expected - principal) / (2 * pi));
-    if (elements_.measure[r] == Measure::tan && to.turns[c] != 0) return false;
+    if (elements_.measure[r] != Measure::tan) continue;
+    if (to.turns[c] != 0 || crossesFold(from.frame[cells.frame0[c]], from.frame[cells.frame1[c]], to.frame[cells.frame0[c]], to.frame[cells.frame1[c]])) return false;
     to.twist[c] = principal + to.turns[c];
   }
   return true;

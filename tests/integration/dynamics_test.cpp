@@ -35,6 +35,25 @@ TEST(FreeFlight, OfASlowLightRodKeepsItsVelocity) {
   for (const Vec3 &v : sim.state.velocity) EXPECT_NEAR(v[0], 1e-3, 1.1e-7); // ten steps, each to 1e-6 of the momentum of eleven vertices
 }
 
+TEST(FoldBarrier, IsNotSteppedOver) {
+  auto corner = [](double degrees) { return Vec3(1 + std::cos(degrees * pi / 180), std::sin(degrees * pi / 180), 0); };
+  for (const Measure measure : {Measure::tan, Measure::angle}) {
+    Rod rod = inextensibleRod({Vec3(0, 0, 0), Vec3(1, 0, 0), corner(170)}, measure);
+    Simulation sim;
+    EXPECT_PETSC(sim.setUp(clampedScene(rod), dynamics(0.01, 1)));
+    sim.potential->beginStep(sim.state, TimeLoop::stepOf(dynamics(0.01, 1), sim.state, 0.01));
+    std::vector<double> increment(sim.dofs.rows(), 0.0);
+    Configuration trial;
+    auto possible = [&](double degrees) {
+      const Vec3 d = corner(degrees) - corner(170);
+      for (int a = 0; a < 3; ++a) increment[sim.elements->vertex_row[2] + a] = d[a];
+      return sim.potential->tryMove(increment, 1, trial);
+    };
+    EXPECT_TRUE(possible(179));
+    EXPECT_EQ(possible(190), measure == Measure::angle); // `angle` has no barrier there
+  }
+}
+
 /// A clamp that travels by a table and turns, in both modes: the vertex is where the table says, and the edge beside it follows its frame.
 TEST(Motion, OfAClampIsFollowedExactly) {
   for (const bool dynamic : {false, true}) {

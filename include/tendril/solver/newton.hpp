@@ -51,7 +51,7 @@ private:
   Vec iterate_vec_ = nullptr; ///< vector that holds the coordinates of the potential's iterate, ...
   PetscObjectState iterate_state_ = 0; ///< ... and its state when they were written
   NewtonReport report_;
-  Configuration trial_;
+  Configuration trial_, shorter_;
   std::vector<double> increment_, rows_, motion_, metric_;
   double energy_ = 0, shift_ = 0, sharpness_ = 1;
   bool energy_known_ = false, moving_ = false;
@@ -65,6 +65,7 @@ private:
   PetscErrorCode shiftUntilPositive(KSP ksp, Vec f, Vec y, int negative, bool regular);
   PetscErrorCode includeMotion(KSP ksp, Vec f, Vec y);
   PetscErrorCode escapeSaddle(bool *left);
+  void predict(const State &start, const Step &step);
   std::string nearBarrier() const;
 };
 
