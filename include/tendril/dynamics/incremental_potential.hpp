@@ -15,6 +15,12 @@ public:
 
   /// Starts a step: the iterate is the start state with supports' frames (not yet their positions) moved to the end of the step.
   void beginStep(const State &start, const Step &step);
+  /// Changes the load factor (in statics also the time) of the step under way; the iterate stays.
+  void setLoadFactor(double factor) {
+    step_.load_factor = step_.time = factor;
+    for (auto &term : terms_) term->setLoadFactor(factor);
+    current_ = false;
+  }
   const Configuration &iterate() const { return iterate_; }
   const Step &step() const { return step_; }
   const Scene &scene() const { return scene_; }
