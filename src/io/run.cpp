@@ -1,5 +1,6 @@
 #include "tendril/io/run.hpp"
 
+#include "tendril/dynamics/arc_length.hpp"
 #include "tendril/dynamics/simulation.hpp"
 #include "tendril/io/progress.hpp"
 #include "tendril/io/scene_reader.hpp"
@@ -28,7 +29,7 @@ struct Options {
   bool has_scene = false;
   std::map<std::string, std::string> overrides;
   LoopSettings loop;
-  bool has_mode = false, has_dt = false, has_t_end = false, has_load_steps = false, has_gravity = false;
+  bool has_mode = false, has_dt = false, has_t_end = false, has_load_steps = false, has_continuation = false, has_bifurcation = false, has_arclength_steps = false, has_gravity = false;
   int load_steps = 1;
   Vec3 gravity = Vec3::Zero();
   std::string output_dir = "out";
@@ -69,6 +70,21 @@ PetscErrorCode readOptions(Options *o) {
   o->has_load_steps = set;
   o->load_steps = int(steps);
   if (set && steps < 1) failOption("-load_steps", "must be at least 1, found " + std::to_string(steps));
+  const char *continuations[] = {"load", "arclength"};
+  choice = 0;
+  PetscCall(PetscOptionsEList("-continuation", "steps of the load factor, or along the path of equilibria, through limit points (static)", "", continuations, 2, continuations[0], &choice, &set));
+  o->has_continuation = set;
+  o->loop.continuation = choice == 0 ? Continuation::load : Continuation::arclength;
+  const char *bifurcations[] = {"off", "locate", "stop"};
+  choice = 1;
+  PetscCall(PetscOptionsEList("-bifurcation", "where stability is lost between load steps: ignore it, find the critical load and go on, or stop there (static)", "", bifurcations, 3, bifurcations[1], &choice, &set));
+  o->has_bifurcation = set;
+  o->loop.bifurcation = choice == 0 ? Bifurcation::off : choice == 1 ? Bifurcation::locate : Bifurcation::stop;
+  steps = o->loop.arclength_steps;
+  PetscCall(PetscOptionsInt("-arclength_steps", "most steps along the path (-continuation arclength)", "", steps, &steps, &set));
+  o->has_arclength_steps = set;
+  o->loop.arclength_steps = int(steps);
+  if (set && steps < 1) failOption("-arclength_steps", "must be at least 1, found " + std::to_string(steps));
   PetscReal gravity[3] = {0, 0, 0};
   PetscInt count = 3;
   PetscCall(PetscOptionsRealArray("-gravity", "acceleration of gravity, e.g. 0,-9.81,0 [m/s^2]", "", gravity, &count, &set));
@@ -122,7 +138,7 @@ PetscErrorCode refuseUnknownOptions() {
   }
   PetscCall(PetscOptionsLeftRestore(nullptr, &n, &names, &values));
   if (!unknown.empty()) {
-    std::vector<std::string> known{"scene", "mode", "dt", "dt_min", "t_end", "load_steps", "gravity", "output_dir", "output_interval", "output_fields", "retraction", "stretch", "snes_rtol", "snes_max_it", "snes_monitor"};
+    std::vector<std::string> known{"scene", "mode", "dt", "dt_min", "t_end", "load_steps", "continuation", "bifurcation", "arclength_steps", "gravity", "output_dir", "output_interval", "output_fields", "retraction", "stretch", "snes_rtol", "snes_max_it", "snes_monitor"};
     for (const auto &o : rodOverrides()) known.push_back("rod_" + o.first);
     const std::string near = closest(unknown, known);
     throw SceneError("option -" + unknown + ": unknown or unused" + (near.empty() ? "" : "; did you mean -" + near + "?") + " (-help lists all options)");
@@ -141,8 +157,13 @@ void resolve(const RunSettings &scene, Options &o) {
     if (o.has_t_end) failOption("-t_end", "has no meaning in -mode static; the load factor ends at 1");
     o.loop.t_end = 1;
     o.loop.dt = 1.0 / o.load_steps;
+    const bool arclength = o.loop.continuation == Continuation::arclength;
+    if (o.has_arclength_steps && !arclength) failOption("-arclength_steps", "needs -continuation arclength");
+    if (o.has_bifurcation && arclength) failOption("-bifurcation", "belongs to -continuation load; along the arc length, negative_pivots in the diagnostics tells stability");
   } else if (o.has_load_steps)
     failOption("-load_steps", "has no meaning in -mode dynamic; use -dt");
+  else if (o.has_continuation || o.has_bifurcation || o.has_arclength_steps)
+    failOption(o.has_continuation ? "-continuation" : o.has_bifurcation ? "-bifurcation" : "-arclength_steps", "has no meaning in -mode dynamic; use -mode static");
   if (o.loop.dt_min > o.loop.dt) failOption("-dt_min", "must not be larger than the step " + std::to_string(o.loop.dt));
 }
 
@@ -205,7 +226,9 @@ void writeOptionsFile(const Options &o, const Provenance &p, const Scene &scene)
   if (o.loop.dynamic)
     out << "dt: " << o.loop.dt << "\nt_end: " << o.loop.t_end << "\n";
   else
-    out << "load_steps: " << o.load_steps << "\n";
+    out << "load_steps: " << o.load_steps << "\ncontinuation: " << (o.loop.continuation == Continuation::load ? "load" : "arclength")
+        << "\nbifurcation: " << (o.loop.bifurcation == Bifurcation::off ? "off" : o.loop.bifurcation == Bifurcation::stop ? "stop" : "locate")
+        << "\narclength_steps: " << o.loop.arclength_steps << "\n";
   out << "dt_min: " << (o.loop.dt_min > 0 ? o.loop.dt_min : o.loop.dt / 1024) << "\ngravity: [" << scene.gravity[0] << ", " << scene.gravity[1] << ", " << scene.gravity[2] << "]\noutput_dir: "
       << o.output_dir << "\noutput_interval: " << o.output_interval << "\nretraction: " << (o.loop.retraction == RetractionKind::length ? "length" : "additive")
       << "\nstretch: " << (o.loop.mixed ? "mixed" : "primal") << "\noutput_fields: [";
@@ -235,6 +258,7 @@ PetscErrorCode setUp(Simulation &run, Options &o) {
   if (o.has_gravity) file.scene.gravity = o.gravity;
   resolve(file.run, o);
   if (!o.loop.dynamic) requireHeld(file.scene);
+  if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength) requireDeadLoads(file.scene);
   PetscCall(run.setUp(std::move(file.scene), o.loop));
   PetscCall(PetscLogStagePop());
   PetscFunctionReturn(0);
@@ -271,6 +295,7 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
   double next_output = o.output_interval;
   long steps = 0, iterations = 0, rejected = 0;
   double wall = 0;
+  const bool arclength = !o.loop.dynamic && o.loop.continuation == Continuation::arclength;
   auto observe = [&](const State &state, const Diagnostics &row) -> PetscErrorCode {
     PetscFunctionBeginUser;
     PetscCall(PetscLogEventBegin(events().output, 0, 0, 0, 0));
@@ -282,7 +307,7 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
     const std::vector<double> values = row.values();
     for (std::size_t k = 0; k < values.size(); ++k) csv << (k ? "," : "") << values[k];
     csv << '\n' << std::flush;
-    if (state.time >= next_output * (1 - 1e-12) || state.time >= o.loop.t_end) {
+    if (arclength || state.time >= next_output * (1 - 1e-12) || state.time >= o.loop.t_end) {
       trajectory.writeFrame(state);
       while (o.output_interval > 0 && next_output <= state.time * (1 + 1e-12)) next_output += o.output_interval;
     }
@@ -291,17 +316,36 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
     PetscFunctionReturn(0);
   };
   PetscCall(PetscLogStagePush(events().run));
-  TimeLoop loop(run.solver, o.loop);
+  auto critical = [&](const CriticalPoint &point) -> PetscErrorCode {
+    PetscFunctionBeginUser;
+    std::ostringstream line;
+    line << (point.limit ? "limit point: " : "") << "critical load factor " << std::setprecision(10) << point.load_factor;
+    progress.say(line.str());
+    trajectory.writeCritical(point.load_factor);
+    trajectory.writeFrame(*point.state);
+    PetscFunctionReturn(0);
+  };
   bool finished;
-  PetscCall(loop.run(run.state, observe, &finished));
+  std::string failure;
+  if (arclength) {
+    ArcLength path(run.solver, o.loop);
+    path.on_critical = critical;
+    PetscCall(path.run(run.state, observe, &finished));
+    failure = path.failure();
+  } else {
+    TimeLoop loop(run.solver, o.loop);
+    loop.on_critical = critical;
+    PetscCall(loop.run(run.state, observe, &finished));
+    failure = loop.failure();
+  }
   PetscCall(PetscLogStagePop());
   std::ostringstream summary;
   summary << steps << " steps, " << iterations << " Newton iterations (mean " << std::setprecision(3) << (steps ? double(iterations) / double(steps) : 0) << "), " << rejected
           << " rejected, " << wall << " s, results in " << o.output_dir;
   progress.say(summary.str());
   if (!finished) {
-    progress.say("failed: " + loop.failure());
-    std::fprintf(stderr, "tendril: %s\n", loop.failure().c_str());
+    progress.say("failed: " + failure);
+    std::fprintf(stderr, "tendril: %s\n", failure.c_str());
     *exit_code = 2;
   }
   PetscFunctionReturn(0);
