@@ -46,7 +46,8 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     const Step step = stepFrom(state, h);
     NewtonReport report;
     PetscCall(solver_.solve(state, step, &report));
-    const bool detects = !settings_.dynamic && settings_.bifurcation != Bifurcation::off;
+    // Couples have no potential: the inertia of the symmetric part says nothing about stability.
+    const bool detects = !settings_.dynamic && settings_.bifurcation != Bifurcation::off && potential.scene().moments.empty();
     if (detects && stable && report.first_negative_pivots > 0 && located_ <= state.time) {
       bool stop = false;
       PetscCall(locate(state, step, &stop));

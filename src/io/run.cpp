@@ -258,6 +258,8 @@ PetscErrorCode setUp(Simulation &run, Options &o) {
   if (o.has_gravity) file.scene.gravity = o.gravity;
   resolve(file.run, o);
   if (!o.loop.dynamic) requireHeld(file.scene);
+  if (o.has_bifurcation && o.loop.bifurcation != Bifurcation::off && !file.scene.moments.empty())
+    failOption("-bifurcation", "a scene with couples has no potential whose Hessian could tell stability; use off");
   if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength) requireDeadLoads(file.scene);
   PetscCall(run.setUp(std::move(file.scene), o.loop));
   PetscCall(PetscLogStagePop());
