@@ -81,9 +81,15 @@ void IncrementalPotential::turnSupports() {
   for (std::size_t s = 0; s < scene_.supports.size(); ++s) {
     const int frame = elements_.support_frame[s];
     if (frame < 0 || !scene_.supports[s].motion.moves()) continue;
-    const Frame now = supportFrame(scene_.supports[s], step_.time);
-    turned[frame - dofs_.edges()] = halfAngleBetween(iterate_.frame[frame], now).angle();
-    iterate_.frame[frame] = now;
+    const Motion &motion = scene_.supports[s].motion;
+    // In parts of less than half a radian, so that whole turns within the step are counted.
+    const int parts = 1 + int(2 * (motion.rotationVectorAt(step_.time) - motion.rotationVectorAt(start_.time)).norm());
+    for (int k = 1; k <= parts; ++k) {
+      const double time = k == parts ? step_.time : start_.time + (step_.time - start_.time) * k / parts;
+      const Frame now = supportFrame(scene_.supports[s], time);
+      turned[frame - dofs_.edges()] += halfAngleBetween(iterate_.frame[frame], now).angle();
+      iterate_.frame[frame] = now;
+    }
     any = true;
   }
   if (!any) return;

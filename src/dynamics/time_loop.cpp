@@ -17,11 +17,17 @@ Step TimeLoop::stepOf(const LoopSettings &settings, const State &state, double d
   return step;
 }
 
-PetscErrorCode TimeLoop::step(State &state, double dt, NewtonReport *report) {
+/// Stability was lost within the step: finds where, and moves `start` there when the run is to end.
+PetscErrorCode TimeLoop::locate(State &start, const Step &step, bool *stop) {
   PetscFunctionBeginUser;
-  const Step step = stepOf(settings_, state, dt);
-  PetscCall(solver_.solve(state, step, report));
-  if (report->converged) solver_.potential().commit(state);
+  CriticalPoint point;
+  bool found;
+  PetscCall(locateCritical(solver_, start, step, &point, &found));
+  if (!found) PetscFunctionReturn(0);
+  located_ = point.load_factor;
+  if (on_critical) PetscCall(on_critical(point));
+  *stop = settings_.bifurcation == Bifurcation::stop;
+  if (*stop) start = *point.state;
   PetscFunctionReturn(0);
 }
 
@@ -31,27 +37,42 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
   const double dt_min = settings_.dt_min > 0 ? settings_.dt_min : settings_.dt / 1024;
   double dt = settings_.dt;
   int rejected = 0, good = 0;
+  bool stable = true;
   PetscLogDouble begin, now;
   PetscCall(PetscTime(&begin));
   EnergyBudget before = energyBudget(potential.scene(), potential.elements(), state, settings_.dynamic ? 1 : state.time);
   *finished = false;
   while (state.time < settings_.t_end) {
     const double h = std::min(dt, settings_.t_end - state.time);
+    const Step step = stepOf(settings_, state, h);
     NewtonReport report;
-    PetscCall(step(state, h, &report));
+    PetscCall(solver_.solve(state, step, &report));
+    // Couples have no potential: the inertia of the symmetric part says nothing about stability.
+    const bool detects = !settings_.dynamic && settings_.bifurcation != Bifurcation::off && potential.scene().moments.empty();
+    if (detects && stable && report.first_negative_pivots > 0 && located_ <= state.time) {
+      bool stop = false;
+      PetscCall(locate(state, step, &stop));
+      *finished = stop;
+      if (stop) PetscFunctionReturn(0);
+      PetscCall(solver_.solve(state, step, &report)); // the potential held the bisection's last step
+    }
+    if (report.converged) potential.commit(state);
     if (!report.converged) { // the state was not touched
       ++rejected;
       good = 0;
       dt = 0.5 * h;
       if (dt >= std::min(dt_min, (settings_.t_end - state.time) / 1024)) continue; // a short last step may be halved as often
       std::ostringstream message;
-      message << (settings_.dynamic ? "step at time " : "load step at factor ") << state.time << " failed with " << (settings_.dynamic ? "dt " : "increment ") << h
-              << ": " << report.reason << " (" << report.iterations << " iterations; residual " << report.residual.force << " of the load, "
+      message << (settings_.dynamic ? "step at time " : "load step at factor ") << state.time << " failed with " << (settings_.dynamic ? "dt " : "increment ")
+              << h << ": " << report.reason << " (" << report.iterations << " iterations; residual " << report.residual.force << " of the load, "
               << report.residual.moment << " of its moment, where -snes_rtol is asked for)";
       failure_ = message.str();
       PetscFunctionReturn(0);
     }
-    if (dt < settings_.dt && ++good >= 4) {
+    stable = report.negative_pivots == 0;
+    if (!settings_.dynamic && report.iterations <= 4 && report.escapes == 0) // load steps grow where they are easy
+      dt = std::min(2 * dt, 4 * settings_.dt);
+    else if (dt < settings_.dt && ++good >= 4) {
       dt = std::min(2 * dt, settings_.dt);
       good = 0;
     }

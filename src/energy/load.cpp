@@ -29,6 +29,8 @@ public:
       }
   }
 
+  void setLoadFactor(double factor) override { factor_ = factor; }
+
   double energy(const Configuration &c, int r) const override {
     const RodRange &rod = elements_.rods[r];
     double sum = 0;

@@ -26,6 +26,9 @@ const std::vector<Entry> &entries() {
         {"dt_min", "smallest step after rejections [s, or load factor]", "(dt/1024)"},
         {"t_end", "end time [s]", "(from the scene) 1"},
         {"load_steps", "equal steps of the load factor from 0 to 1 (static)", "(from the scene) 1"},
+        {"continuation", "load: steps of the load factor; arclength: along the path of equilibria, through limit points (static)", "load"},
+        {"arclength_steps", "most steps along the path (-continuation arclength)", "200"},
+        {"bifurcation", "where stability is lost between load steps: off, locate (find the critical load and go on), or stop there (static)", "locate"},
         {"gravity", "acceleration of gravity, e.g. 0,-9.81,0 [m/s^2]", "(from the scene)"},
         {"output_dir", "folder for the results", "out"},
         {"output_interval", "time between frames: the first step at or after each multiple is written; 0: every step [s]", "0"},
@@ -67,6 +70,12 @@ public:
     const std::vector<double> v = numbers(name);
     if (v.size() != 1) fail(name, "needs one number, found '" + at(name) + "'");
     return v[0];
+  }
+
+  int count(const std::string &name) const {
+    const double n = number(name);
+    if (!(n >= 1 && n <= 1e9 && n == std::floor(n))) fail(name, "must be a whole number of at least 1, found '" + at(name) + "'");
+    return int(n);
   }
 
   double positive(const std::string &name) const {
@@ -143,10 +152,12 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   if (texts.has("dt")) o->dt = texts.positive("dt");
   if (texts.has("t_end")) o->t_end = texts.positive("t_end");
   if (texts.has("dt_min")) o->loop.dt_min = texts.positive("dt_min");
-  if (texts.has("load_steps")) {
-    const double n = texts.number("load_steps");
-    if (!(n >= 1 && n <= 1e9 && n == std::floor(n))) fail("load_steps", "must be a whole number of at least 1, found '" + texts.at("load_steps") + "'");
-    o->given_load_steps = int(n);
+  if (texts.has("load_steps")) o->given_load_steps = texts.count("load_steps");
+  if (texts.has("arclength_steps")) o->arclength_steps = texts.count("arclength_steps");
+  if (texts.has("continuation")) o->continuation = texts.oneOf("continuation", {"load", "arclength"}) == "load" ? Continuation::load : Continuation::arclength;
+  if (texts.has("bifurcation")) {
+    const std::string b = texts.oneOf("bifurcation", {"off", "locate", "stop"});
+    o->bifurcation = b == "off" ? Bifurcation::off : b == "locate" ? Bifurcation::locate : Bifurcation::stop;
   }
   if (texts.has("gravity")) {
     const std::vector<double> g = texts.numbers("gravity");
@@ -173,9 +184,14 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
 
 void resolve(const RunSettings &scene, Options &o) {
   o.loop.dynamic = o.mode.value_or(scene.mode) == "dynamic";
+  o.loop.continuation = o.continuation.value_or(Continuation::load);
+  o.loop.bifurcation = o.bifurcation.value_or(Bifurcation::locate);
+  o.loop.arclength_steps = o.arclength_steps.value_or(o.loop.arclength_steps);
   o.load_steps = o.given_load_steps.value_or(scene.load_steps);
   if (o.loop.dynamic) {
     if (o.given_load_steps) fail("load_steps", "has no meaning in -mode dynamic; use -dt");
+    if (o.continuation || o.bifurcation || o.arclength_steps)
+      fail(o.continuation ? "continuation" : o.bifurcation ? "bifurcation" : "arclength_steps", "has no meaning in -mode dynamic; use -mode static");
     o.loop.dt = o.dt.value_or(scene.dt);
     o.loop.t_end = o.t_end.value_or(scene.t_end);
     if (o.loop.t_end / o.loop.dt > 1e12)
@@ -185,6 +201,9 @@ void resolve(const RunSettings &scene, Options &o) {
     if (o.t_end) fail("t_end", "has no meaning in -mode static; the load factor ends at 1");
     o.loop.t_end = 1;
     o.loop.dt = 1.0 / o.load_steps;
+    const bool arclength = o.loop.continuation == Continuation::arclength;
+    if (o.arclength_steps && !arclength) fail("arclength_steps", "needs -continuation arclength");
+    if (o.bifurcation && arclength) fail("bifurcation", "belongs to -continuation load; along the arc length, negative_pivots in the diagnostics tells stability");
   }
   if (o.loop.dt_min > o.loop.dt) fail("dt_min", "must not be larger than the step " + std::to_string(o.loop.dt));
 }
@@ -227,8 +246,12 @@ void writeOptionsFile(const std::string &path, const Options &o, const Provenanc
   if (o.loop.dynamic) {
     put("dt", o.loop.dt);
     put("t_end", o.loop.t_end);
-  } else
+  } else {
     put("load_steps", o.load_steps);
+    put("continuation", o.loop.continuation == Continuation::load ? "load" : "arclength");
+    put("bifurcation", o.loop.bifurcation == Bifurcation::off ? "off" : o.loop.bifurcation == Bifurcation::stop ? "stop" : "locate");
+    put("arclength_steps", o.loop.arclength_steps);
+  }
   put("dt_min", o.loop.dt_min > 0 ? o.loop.dt_min : o.loop.dt / 1024);
   out << YAML::Key << "gravity" << YAML::Value;
   list(scene.gravity.data(), scene.gravity.data() + 3);

@@ -1,5 +1,6 @@
 #include "tendril/io/run.hpp"
 
+#include "tendril/dynamics/arc_length.hpp"
 #include "tendril/dynamics/simulation.hpp"
 #include "tendril/io/options.hpp"
 #include "tendril/io/progress.hpp"
@@ -104,6 +105,9 @@ PetscErrorCode setUp(Simulation &run, Options &o) {
   if (o.gravity) file.scene.gravity = *o.gravity;
   resolve(file.run, o);
   if (!o.loop.dynamic) requireHeld(file.scene);
+  if (o.bifurcation && o.loop.bifurcation != Bifurcation::off && !file.scene.moments.empty())
+    throw SceneError("option -bifurcation: a scene with couples has no potential whose Hessian could tell stability; use off");
+  if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength) requireDeadLoads(file.scene);
   PetscCall(run.setUp(std::move(file.scene), o.loop));
   PetscCall(run.solver.rehearse(run.state, TimeLoop::stepOf(o.loop, run.state, o.loop.dt)));
   PetscCall(PetscLogStagePop());
@@ -149,6 +153,7 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
   long steps = 0, iterations = 0, rejected = 0;
   double wall = 0;
   bool warned = false;
+  const bool arclength = !o.loop.dynamic && o.loop.continuation == Continuation::arclength;
   auto observe = [&](const State &state, const Diagnostics &row) -> PetscErrorCode {
     PetscFunctionBeginUser;
     PetscCall(PetscLogEventBegin(events().output, 0, 0, 0, 0));
@@ -160,7 +165,7 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
     const std::vector<double> values = row.values();
     for (std::size_t k = 0; k < values.size(); ++k) csv << (k ? "," : "") << values[k];
     csv << '\n' << std::flush;
-    if (state.time >= next_output * (1 - 1e-12) || state.time >= o.loop.t_end) {
+    if (arclength || state.time >= next_output * (1 - 1e-12) || state.time >= o.loop.t_end) {
       trajectory.writeFrame(state);
       while (o.output_interval > 0 && next_output <= state.time * (1 + 1e-12)) next_output += o.output_interval;
     }
@@ -173,17 +178,36 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
     PetscFunctionReturn(0);
   };
   PetscCall(PetscLogStagePush(events().run));
-  TimeLoop loop(run.solver, o.loop);
+  auto critical = [&](const CriticalPoint &point) -> PetscErrorCode {
+    PetscFunctionBeginUser;
+    std::ostringstream line;
+    line << (point.limit ? "limit point: " : "") << "critical load factor " << std::setprecision(10) << point.load_factor;
+    progress.say(line.str());
+    trajectory.writeCritical(point.load_factor);
+    trajectory.writeFrame(*point.state);
+    PetscFunctionReturn(0);
+  };
   bool finished;
-  PetscCall(loop.run(run.state, observe, &finished));
+  std::string failure;
+  if (arclength) {
+    ArcLength path(run.solver, o.loop);
+    path.on_critical = critical;
+    PetscCall(path.run(run.state, observe, &finished));
+    failure = path.failure();
+  } else {
+    TimeLoop loop(run.solver, o.loop);
+    loop.on_critical = critical;
+    PetscCall(loop.run(run.state, observe, &finished));
+    failure = loop.failure();
+  }
   PetscCall(PetscLogStagePop());
   std::ostringstream summary;
   summary << steps << " steps, " << iterations << " Newton iterations (mean " << std::setprecision(3) << (steps ? double(iterations) / double(steps) : 0) << "), " << rejected
           << " rejected, " << wall << " s, results in " << o.output_dir;
   progress.say(summary.str());
   if (!finished) {
-    progress.say("failed: " + loop.failure());
-    std::fprintf(stderr, "tendril: %s\n", loop.failure().c_str());
+    progress.say("failed: " + failure);
+    std::fprintf(stderr, "tendril: %s\n", failure.c_str());
     *exit_code = 2;
   }
   PetscFunctionReturn(0);

@@ -88,6 +88,8 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
   file_.createGroup("diagnostics");
   for (const std::string &name : Diagnostics::names())
     diagnostics_.push_back(std::make_unique<Hdf5Series>(file_, "diagnostics/" + name, std::vector<hsize_t>{}));
+  file_.createGroup("critical");
+  critical_ = std::make_unique<Hdf5Series>(file_, "critical/load_factor", std::vector<hsize_t>{});
   step_ = std::make_unique<Hdf5Series>(file_, "step", std::vector<hsize_t>{}, true);
   time_ = std::make_unique<Hdf5Series>(file_, "time", std::vector<hsize_t>{});
   file_.startAppending();
@@ -171,6 +173,11 @@ void TrajectoryWriter::writeDiagnostics(const Diagnostics &row) {
     diagnostics_[k]->append(&values[k]);
     diagnostics_[k]->flush();
   }
+}
+
+void TrajectoryWriter::writeCritical(double load_factor) {
+  critical_->append(&load_factor);
+  critical_->flush();
 }
 
 /// The frames as slabs of the HDF5 datasets, in the form of ParaView's "XDMF Reader". Two blocks over the same points:

@@ -26,8 +26,10 @@ Vec3 interpolate(const std::vector<Motion::Key> &table, double time, Vec3 Motion
 
 Vec3 Motion::displacementAt(double time) const { return table.empty() ? Vec3(velocity * time) : interpolate(table, time, &Key::displacement); }
 
+Vec3 Motion::rotationVectorAt(double time) const { return table.empty() ? Vec3(angular_velocity * time) : interpolate(table, time, &Key::rotation); }
+
 Mat3 Motion::rotationAt(double time) const {
-  const Vec3 r = table.empty() ? Vec3(angular_velocity * time) : interpolate(table, time, &Key::rotation);
+  const Vec3 r = rotationVectorAt(time);
   const double angle = r.norm();
   if (angle == 0) return Mat3::Identity();
   return Eigen::AngleAxisd(angle, r / angle).toRotationMatrix();

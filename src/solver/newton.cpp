@@ -70,6 +70,11 @@ std::vector<double> shiftMetric(const Elements &e, int rows) {
 
 } // namespace
 
+bool isSmall(const IncrementalPotential::Residual &r, double rtol) {
+  return r.force <= std::max(rtol, r.force_floor) && r.moment <= std::max(rtol, r.moment_floor) &&
+         r.compatibility <= std::max(1e-4 * rtol, r.compatibility_floor);
+}
+
 PetscErrorCode registerSolvers() {
   PetscFunctionBeginUser;
   PetscCall(SNESLineSearchRegister(line_search_name, createLineSearch));
@@ -178,8 +183,7 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
   *reason = SNES_CONVERGED_ITERATING;
   if (!std::isfinite(r.force) || !std::isfinite(r.moment))
     *reason = SNES_DIVERGED_FNORM_NAN;
-  else if (!moving_ && r.force <= std::max(rtol, r.force_floor) && r.moment <= std::max(rtol, r.moment_floor) &&
-           r.compatibility <= std::max(1e-4 * rtol, r.compatibility_floor))
+  else if (!moving_ && isSmall(r, rtol))
     *reason = SNES_CONVERGED_FNORM_RELATIVE;
   else if (iteration >= limit)
     *reason = SNES_DIVERGED_MAX_IT;
@@ -295,7 +299,7 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   PetscCall(moveTo(x));
   bool regular;
   PetscCall(readInertia(&report_.negative_pivots, &regular));
-  if (report_.negative_pivots > 0 || !regular) PetscCall(makeDescent(ksp, f, y, report_.negative_pivots, regular));
+  if (seek_minimum && (report_.negative_pivots > 0 || !regular)) PetscCall(makeDescent(ksp, f, y, report_.negative_pivots, regular));
   if (moving_) PetscCall(includeMotion(ksp, f, y));
 
   increment_.assign(potential_->dofs().rows(), 0.0);
@@ -320,7 +324,7 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
     const double energy = possible ? potential_->energy(trial_) : HUGE_VAL;
     PetscCall(PetscLogEventEnd(events().energy, 0, 0, 0, 0));
     // Supports that move do work: the energy may rise with them, and only has to be finite.
-    accepted = std::isfinite(energy) && (moving_ || energy <= energy_ + sufficient * lambda * slope + noise);
+    accepted = std::isfinite(energy) && (moving_ || !seek_minimum || energy <= energy_ + sufficient * lambda * slope + noise);
     if (accepted) {
       energy_ = energy;
       break;
@@ -572,6 +576,8 @@ PetscErrorCode NewtonSolver::solve(const State &start, const Step &step, NewtonR
   // In statics the answer must be a minimum.
   for (int k = 0; step.isStatic() && !failure; ++k) {
     PetscCall(inertiaAtIterate(&report_.negative_pivots));
+    if (k == 0) report_.first_negative_pivots = report_.negative_pivots;
+    if (!seek_minimum && report_.negative_pivots >= 0) break;
     if (report_.negative_pivots == 0 || (report_.negative_pivots > 0 && !potential_->scene().moments.empty())) break; // couples: no minimum to speak of
     bool left = false;
     if (report_.negative_pivots > 0 && k < 10) PetscCall(escapeSaddle(&left));

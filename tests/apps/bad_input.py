@@ -226,6 +226,14 @@ rows = [
     ("unknown mode", None, ["-mode", "quick"], ["-mode", "quick"]),
     ("no load steps", None, ["-mode", "static", "-load_steps", "0"], ["-load_steps", "at least 1"]),
     ("smallest step above the step", None, ["-dt_min", "1"], ["-dt_min", "not be larger"]),
+    ("unknown continuation", None, ["-mode", "static", "-continuation", "arc"], ["-continuation", "arc"]),
+    ("continuation in dynamics", None, ["-continuation", "arclength"], ["-continuation", "no meaning"]),
+    ("bifurcation in dynamics", None, ["-bifurcation", "stop"], ["-bifurcation", "no meaning"]),
+    ("bifurcation along the arc length", None, ["-mode", "static", "-continuation", "arclength", "-bifurcation", "stop"], ["-bifurcation", "negative_pivots"]),
+    ("no steps along the path", None, ["-mode", "static", "-continuation", "arclength", "-arclength_steps", "0"], ["-arclength_steps", "at least 1"]),
+    ("steps along the path for load steps", None, ["-mode", "static", "-arclength_steps", "5"], ["-arclength_steps", "-continuation arclength"]),
+    ("path without a load", None, ["-mode", "static", "-continuation", "arclength", "-gravity", "0,0,0"], ["needs a load"]),
+    ("path of a moving support", ("type: clamp}", "type: clamp, motion: {velocity: [1, 0, 0]}}"), ["-mode", "static", "-continuation", "arclength"], ["moves", "-continuation load"]),
     ("free rod in statics", ("supports:\n  - {vertex: 0, type: clamp}\n", ""), ["-mode", "static"], ["free to move"]),
 ]
 
@@ -262,7 +270,7 @@ failures = len(complaints)
 for complaint in complaints:
     print(complaint)
 help_text = subprocess.run([program, "-help"], capture_output=True, text=True)
-for option in "scene mode dt dt_min t_end load_steps gravity output_dir output_interval output_fields retraction stretch rod_young rod_measure".split():
+for option in "scene mode dt dt_min t_end load_steps continuation bifurcation arclength_steps gravity output_dir output_interval output_fields retraction stretch rod_young rod_measure".split():
     if f"-{option}" not in help_text.stdout or help_text.returncode != 0:
         failures += 1
         print("-help does not list", option)

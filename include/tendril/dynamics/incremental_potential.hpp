@@ -17,6 +17,12 @@ public:
   void beginStep(const State &start, const Step &step);
   /// Whether a support has turned its edge past 180 degrees of twist in one step, where the measure `tan` has its barrier.
   bool beyondBarrier() const { return beyond_barrier_; }
+  /// Changes the load factor (in statics also the time) of the step under way; the iterate stays.
+  void setLoadFactor(double factor) {
+    step_.load_factor = step_.time = factor;
+    for (auto &term : terms_) term->setLoadFactor(factor);
+    current_ = false;
+  }
   const Configuration &iterate() const { return iterate_; }
   const Step &step() const { return step_; }
   const Scene &scene() const { return scene_; }

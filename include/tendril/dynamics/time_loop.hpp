@@ -2,6 +2,7 @@
 /// \file time_loop.hpp
 /// Steps through time (dynamics) or load (statics), rejecting what does not converge.
 
+#include "tendril/dynamics/bifurcation.hpp"
 #include "tendril/io/trajectory.hpp"
 #include "tendril/solver/newton.hpp"
 
@@ -9,9 +10,17 @@
 
 namespace tendril {
 
+/// Statics: steps of the load factor, or of the arc length of the path of equilibria (ArcLength).
+enum class Continuation { load, arclength };
+/// What to do where a path of minima ends: nothing, locate the critical load and go on, or end the run there.
+enum class Bifurcation { off, locate, stop };
+
 struct LoopSettings {
   bool dynamic = true;
   double dt = 1e-2, dt_min = 0, t_end = 1; ///< in statics time is the load factor and ends at 1
+  Continuation continuation = Continuation::load;
+  Bifurcation bifurcation = Bifurcation::locate; ///< statics, load steps
+  int arclength_steps = 200;                     ///< most steps along the path
   bool mixed = true;
   HessianKind hessian = HessianKind::exact;
   RetractionKind retraction = RetractionKind::length;
@@ -21,6 +30,7 @@ struct LoopSettings {
 class TimeLoop {
 public:
   using Observer = std::function<PetscErrorCode(const State &, const Diagnostics &)>;
+  CriticalObserver on_critical; ///< told of each critical point, before the step beyond it
   TimeLoop(NewtonSolver &solver, const LoopSettings &settings) : solver_(solver), settings_(settings) {}
 
   /// Advances `state` to the end. `finished` is false when dt_min was reached; `state` is then the last one accepted, bit for bit.
@@ -33,8 +43,9 @@ private:
   NewtonSolver &solver_;
   LoopSettings settings_;
   std::string failure_;
+  double located_ = -1; ///< last critical load factor
 
-  PetscErrorCode step(State &state, double dt, NewtonReport *report);
+  PetscErrorCode locate(State &start, const Step &step, bool *stop);
 };
 
 } // namespace tendril

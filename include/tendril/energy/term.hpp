@@ -35,6 +35,8 @@ public:
   virtual void beginStep(const State & /*start*/, const Configuration & /*start*/, const Step & /*step*/) {}
   /// Called whenever the iterate has moved.
   virtual void moveIterate(const Configuration & /*iterate*/) {}
+  /// Called when the load factor changes within a step.
+  virtual void setLoadFactor(double /*factor*/) {}
   /// [J], up to a constant of the step. Not finite where the configuration is impossible.
   virtual double energy(const Configuration &configuration, int rod) const = 0;
   /// Adds gradient and Hessian, pulled back by the retraction at the configuration.

@@ -14,9 +14,11 @@ namespace tendril {
 struct Options {
   std::string scene; ///< empty when not given
   bool help = false;
-  std::optional<std::string> mode; ///< these four as given; `loop` holds what is in force
+  std::optional<std::string> mode; ///< these as given; `loop` holds what is in force
   std::optional<double> dt, t_end;
-  std::optional<int> given_load_steps;
+  std::optional<int> given_load_steps, arclength_steps;
+  std::optional<Continuation> continuation;
+  std::optional<Bifurcation> bifurcation;
   Overrides overrides;
   LoopSettings loop;
   int load_steps = 1;

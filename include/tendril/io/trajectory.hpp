@@ -36,6 +36,8 @@ public:
   ~TrajectoryWriter();
   void writeFrame(const State &state);
   void writeDiagnostics(const Diagnostics &row);
+  /// Adds to /critical/load_factor.
+  void writeCritical(double load_factor);
   int frames() const { return int(times_.size()); }
 
   static const std::vector<std::string> &fieldNames();
@@ -48,7 +50,7 @@ private:
   std::vector<double> times_;
   Hdf5File file_;
   std::vector<std::pair<std::string, std::unique_ptr<Hdf5Series>>> state_;
-  std::unique_ptr<Hdf5Series> time_, step_;
+  std::unique_ptr<Hdf5Series> time_, step_, critical_;
   std::vector<std::unique_ptr<Hdf5Series>> diagnostics_;
 
   void writeHeader(const Scene &scene, const Elements &elements, const Provenance &provenance);

@@ -16,14 +16,21 @@ struct NewtonReport {
   int shifts = 0;            ///< factorisations repeated with a shifted diagonal
   int negative_pivots = 0;   ///< of the last Hessian, unshifted
   int neutral_pivots = 0;    ///< motions that cost no energy (solver type banded)
+  int first_negative_pivots = 0; ///< at the equilibrium found first, before any escape (statics)
   int escapes = 0;           ///< saddles left along a direction of negative curvature (statics)
   IncrementalPotential::Residual residual;
   std::vector<double> history; ///< force residual, relative to the load scale, at every iterate
   std::string reason;        ///< in words
 };
 
+/// Whether an iterate is an answer: each residual below `rtol` of its scale, or below what rounding leaves.
+bool isSmall(const IncrementalPotential::Residual &residual, double rtol);
+
 class NewtonSolver {
 public:
+  /// Off: Newton's own full steps, to an equilibrium of any stability, for following a branch. On: only minima are answers in statics.
+  bool seek_minimum = true;
+
   /// Creates SNES and its parts and reads -snes_*, -ksp_*, -pc_*, -mat_* options.
   PetscErrorCode setUp(IncrementalPotential &potential);
   /// Minimises the potential of the step. The potential's iterate is the answer when `report` says converged.

@@ -1,0 +1,54 @@
+#pragma once
+/// \file arc_length.hpp
+/// Bordered arc-length continuation (Keller 1977; Riks 1979): follows a path of equilibria, stable or not, through limit points of the load.
+
+#include "tendril/dynamics/time_loop.hpp"
+
+namespace tendril {
+
+/// \throws SceneError when the path has another parameter than the load factor (prescribed motions), or no load at all
+void requireDeadLoads(const Scene &scene);
+
+/// Unknowns are the rows q and the load factor. Length along the path, without units:
+///   ds^2 = mean over vertices of |dx|^2/L^2 + mean over edges of d(theta)^2 + d(factor)^2.
+class ArcLength {
+public:
+  /// The first step is as long as a load step of `settings.dt` is there; steps then adapt to four iterations.
+  ArcLength(NewtonSolver &solver, const LoopSettings &settings);
+
+  CriticalObserver on_critical; ///< told of limit points, before the step that passes them
+  /// Follows the path from `state` until the load factor is 1 or the steps are used up. `finished` is false when a step of the smallest length
+  /// failed; `state` is then the last one accepted. Diagnostics' dt is the step along the path.
+  PetscErrorCode run(State &state, const TimeLoop::Observer &observe, bool *finished);
+  const std::string &failure() const { return failure_; }
+
+private:
+  /// A point relative to the start of the step, or a direction.
+  struct Point {
+    std::vector<double> rows;
+    double factor = 0;
+  };
+  NewtonSolver &solver_;
+  LoopSettings settings_;
+  std::unique_ptr<Term> load_; ///< at load factor 1: its gradient is the derivative of the gradient by the load factor
+  std::vector<double> metric_;
+  Rows load_rows_;
+  Point last_; ///< the last step taken
+  Configuration trial_;
+  std::string failure_, obstacle_;
+  int iterations_ = 0, negative_ = 0;
+
+  double product(const Point &a, const Point &b) const;
+  PetscErrorCode findStart(State &state);
+  PetscErrorCode tangent(Point *direction);
+  PetscErrorCode solveLoad(std::vector<double> *response);
+  PetscErrorCode solveRows(const std::vector<double> &right, std::vector<double> *solution);
+  bool move(const std::vector<double> &increment, double factor);
+  PetscErrorCode correct(double start, const Point &direction, double length, bool *converged);
+  PetscErrorCode correctAt(double factor, bool *converged);
+  PetscErrorCode iterate(const std::function<double(const Point &moved, const Point &residual, const Point &load)> &constraint, double start, bool *converged);
+  PetscErrorCode step(const State &state, double length, bool *converged);
+  PetscErrorCode locateLimit(const State &start, const Point &before, const std::array<double, 2> &slopes, double length);
+};
+
+} // namespace tendril

@@ -1,0 +1,310 @@
+#include "tendril/dynamics/arc_length.hpp"
+
+#include <algorithm>
+#include <petsctime.h>
+#include <sstream>
+
+namespace tendril {
+
+void requireDeadLoads(const Scene &scene) {
+  for (const Support &support : scene.supports)
+    if (support.motion.moves())
+      throw SceneError("the support of rod '" + scene.rods[support.rod].name + "' at vertex " + std::to_string(support.vertex) +
+                       " moves: -continuation arclength scales dead loads only; hold the support still or use -continuation load");
+  const bool weight = !scene.gravity.isZero(0) && std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &rod) { return rod.gravity; });
+  if (!weight && scene.forces.empty() && scene.moments.empty())
+    throw SceneError("-continuation arclength needs a load to follow: gravity, a force, a torque or a moment");
+}
+
+ArcLength::ArcLength(NewtonSolver &solver, const LoopSettings &settings) : solver_(solver), settings_(settings) {
+  const IncrementalPotential &potential = solver.potential();
+  const Elements &e = potential.elements();
+  load_ = makeLoad(potential.scene(), e);
+  const std::size_t rows = solver.potential().dofs().rows();
+  load_rows_.gradient.resize(rows);
+  load_rows_.equilibrium.resize(rows);
+  load_rows_.band.resize(rows * DofMap::band);
+  metric_.assign(rows, 0.0);
+  for (const RodRange &rod : e.rods) {
+    double length = 0;
+    for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) length += e.rest_length[i];
+    for (int v = rod.first_vertex; v < rod.first_vertex + rod.vertices; ++v)
+      for (int a = 0; a < 3; ++a) metric_[e.vertex_row[v] + a] = 1 / (length * length * double(e.vertex_row.size()));
+    if (rod.stride == 4)
+      for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) metric_[e.edge_row[i] + 3] = 1 / double(e.edge_row.size());
+  }
+}
+
+double ArcLength::product(const Point &a, const Point &b) const {
+  double sum = a.factor * b.factor;
+  for (std::size_t k = 0; k < metric_.size(); ++k) sum += metric_[k] * a.rows[k] * b.rows[k];
+  return sum;
+}
+
+/// Equilibrium at the load factor the run begins with: rods need not be at rest as drawn.
+PetscErrorCode ArcLength::findStart(State &state) {
+  PetscFunctionBeginUser;
+  Step step;
+  step.time = step.load_factor = state.time;
+  step.mixed = settings_.mixed;
+  NewtonReport report;
+  PetscCall(solver_.solve(state, step, &report));
+  if (!report.converged) {
+    failure_ = "no equilibrium to start the path from: " + report.reason;
+    PetscFunctionReturn(0);
+  }
+  const std::int64_t number = state.step;
+  solver_.potential().commit(state);
+  state.step = number;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode ArcLength::solveRows(const std::vector<double> &right, std::vector<double> *solution) {
+  KSP ksp;
+  OwnedVec b, x;
+  PetscFunctionBeginUser;
+  const DofMap &dofs = solver_.potential().dofs();
+  PetscCall(SNESGetKSP(solver_.snes(), &ksp));
+  PetscCall(DMCreateGlobalVector(dofs.dm(), b.out()));
+  PetscCall(VecDuplicate(b, x.out()));
+  PetscCall(dofs.gather(right, b));
+  PetscCall(KSPSolve(ksp, b, x));
+  solution->assign(metric_.size(), 0.0);
+  PetscCall(dofs.scatter(x, *solution));
+  PetscFunctionReturn(0);
+}
+
+/// Change of the equilibrium by unit load factor, K y = -d(gradient)/d(factor), with the Hessian factored last.
+PetscErrorCode ArcLength::solveLoad(std::vector<double> *response) {
+  PetscFunctionBeginUser;
+  const IncrementalPotential &potential = solver_.potential();
+  std::fill(load_rows_.gradient.begin(), load_rows_.gradient.end(), 0.0);
+  for (std::size_t r = 0; r < potential.elements().rods.size(); ++r) load_->addDerivatives(potential.iterate(), int(r), load_rows_);
+  PetscCall(solveRows(load_rows_.gradient, response));
+  for (double &y : *response) y = -y;
+  PetscFunctionReturn(0);
+}
+
+/// Unit tangent of the path at the iterate, on the side of the last step.
+PetscErrorCode ArcLength::tangent(Point *direction) {
+  PetscFunctionBeginUser;
+  PetscCall(solver_.inertiaAtIterate(&negative_));
+  if (negative_ < 0) obstacle_ = "the Hessian cannot be factored";
+  direction->factor = 1;
+  PetscCall(solveLoad(&direction->rows));
+  const double side = last_.rows.empty() ? 1 : product(*direction, last_), norm = std::sqrt(product(*direction, *direction));
+  const double scale = (side < 0 ? -1 : 1) / norm;
+  for (double &d : direction->rows) d *= scale;
+  direction->factor *= scale;
+  PetscFunctionReturn(0);
+}
+
+bool ArcLength::move(const std::vector<double> &increment, double factor) {
+  IncrementalPotential &potential = solver_.potential();
+  if (!std::isfinite(factor) || !potential.tryMove(increment, 1.0, trial_)) return false;
+  potential.accept(trial_);
+  potential.setLoadFactor(factor);
+  return true;
+}
+
+/// Newton on equilibrium and one constraint: two solves per factorisation, one for the residual and one for the load. The constraint gives the
+/// change of the load factor from the way made so far and the two solutions.
+PetscErrorCode ArcLength::iterate(const std::function<double(const Point &moved, const Point &residual, const Point &load)> &constraint, double start,
+                                  bool *converged) {
+  constexpr int most_iterations = 15;
+  PetscFunctionBeginUser;
+  IncrementalPotential &potential = solver_.potential();
+  PetscReal rtol;
+  PetscCall(SNESGetTolerances(solver_.snes(), nullptr, &rtol, nullptr, nullptr, nullptr));
+  *converged = false;
+  for (int k = 0; k <= most_iterations; ++k) {
+    const IncrementalPotential::Residual residual = potential.residual();
+    if (!std::isfinite(residual.force) || !std::isfinite(residual.moment)) {
+      obstacle_ = "the forces are not finite";
+      PetscFunctionReturn(0);
+    }
+    *converged = k > 0 && isSmall(residual, rtol);
+    if (*converged) PetscFunctionReturn(0);
+    if (k == most_iterations) break;
+    int negative;
+    PetscCall(solver_.inertiaAtIterate(&negative));
+    if (negative < 0) {
+      obstacle_ = "the Hessian cannot be factored";
+      PetscFunctionReturn(0);
+    }
+    Point moved, correction, load;
+    load.factor = 1;
+    potential.coordinates(moved.rows);
+    moved.factor = potential.step().load_factor - start;
+    PetscCall(solveRows(potential.derivatives().gradient, &correction.rows));
+    for (double &d : correction.rows) d = -d;
+    PetscCall(solveLoad(&load.rows));
+    const double change = constraint(moved, correction, load);
+    for (std::size_t r = 0; r < correction.rows.size(); ++r) correction.rows[r] += change * load.rows[r];
+    ++iterations_;
+    if (!move(correction.rows, potential.step().load_factor + change)) {
+      obstacle_ = "an edge vanishes or turns back on itself";
+      PetscFunctionReturn(0);
+    }
+  }
+  obstacle_ = "the corrector did not converge";
+  PetscFunctionReturn(0);
+}
+
+/// From the predicted point to the path, in the plane normal to the tangent at the start of the step.
+PetscErrorCode ArcLength::correct(double start, const Point &direction, double length, bool *converged) {
+  PetscFunctionBeginUser;
+  PetscCall(iterate([&](const Point &moved, const Point &residual,
+                        const Point &load) { return (length - product(direction, moved) - product(direction, residual)) / product(direction, load); },
+                    start, converged));
+  PetscFunctionReturn(0);
+}
+
+/// To the point of the path nearby that has a given load factor.
+PetscErrorCode ArcLength::correctAt(double factor, bool *converged) {
+  PetscFunctionBeginUser;
+  PetscCall(iterate([&](const Point &moved, const Point &, const Point &) { return factor - moved.factor; }, 0, converged));
+  if (*converged) solver_.potential().setLoadFactor(factor);
+  PetscFunctionReturn(0);
+}
+
+/// One step; the potential's iterate is its end when it converged.
+PetscErrorCode ArcLength::step(const State &state, double length, bool *converged) {
+  constexpr double straying = 1.5; // of the step's length, from tangent to chord below 48 degrees: beyond it may be another branch
+  PetscFunctionBeginUser;
+  *converged = false;
+  iterations_ = 0;
+  obstacle_.clear();
+  Step step;
+  step.time = step.load_factor = state.time;
+  step.mixed = settings_.mixed;
+  IncrementalPotential &potential = solver_.potential();
+  potential.beginStep(state, step);
+  Point direction;
+  PetscCall(tangent(&direction));
+  if (!obstacle_.empty()) PetscFunctionReturn(0);
+  Point predicted = direction;
+  for (double &d : predicted.rows) d *= length;
+  if (!move(predicted.rows, state.time + length * direction.factor)) {
+    obstacle_ = "an edge vanishes or turns back on itself";
+    PetscFunctionReturn(0);
+  }
+  PetscCall(correct(state.time, direction, length, converged));
+  if (*converged && potential.step().load_factor > settings_.t_end) PetscCall(correctAt(settings_.t_end, converged));
+  if (!*converged) PetscFunctionReturn(0);
+  Point moved;
+  potential.coordinates(moved.rows);
+  moved.factor = potential.step().load_factor - state.time;
+  *converged = product(moved, moved) < straying * straying * length * length;
+  if (*converged)
+    last_ = moved;
+  else
+    obstacle_ = "the step strayed from the path";
+  PetscFunctionReturn(0);
+}
+
+/// The point between the ends of a step where the load factor turns: false position (Illinois) on the slope of the load factor along the path,
+/// by steps of other lengths from the same start.
+PetscErrorCode ArcLength::locateLimit(const State &start, const Point &before, const std::array<double, 2> &slopes, double length) {
+  constexpr int most_steps = 20;
+  constexpr double flat = 1e-4; // of the slope at the start: the load factor is off by its square
+  PetscFunctionBeginUser;
+  const Point after = std::exchange(last_, before);
+  const int iterations = iterations_, negative = negative_;
+  std::array<double, 2> ends{0, length}, values = slopes;
+  CriticalPoint point;
+  point.limit = true;
+  for (int k = 0, kept = -1; k < most_steps; ++k) {
+    const double middle = (ends[0] * values[1] - ends[1] * values[0]) / (values[1] - values[0]);
+    last_ = before;
+    bool converged;
+    PetscCall(step(start, middle, &converged));
+    if (!converged) break;
+    Point direction;
+    PetscCall(tangent(&direction));
+    State state = start;
+    solver_.potential().commit(state);
+    state.step = start.step;
+    point.load_factor = state.time;
+    point.state = state;
+    if (std::abs(direction.factor) < flat * std::abs(slopes[0])) break;
+    const int side = direction.factor * values[0] > 0 ? 0 : 1;
+    ends[side] = middle;
+    values[side] = direction.factor;
+    if (kept == side) values[1 - side] *= 0.5;
+    kept = side;
+  }
+  last_ = after;
+  iterations_ = iterations;
+  negative_ = negative;
+  if (point.state && on_critical) PetscCall(on_critical(point));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, bool *finished) {
+  constexpr double wanted_iterations = 4, most_growth = 4;
+  PetscFunctionBeginUser;
+  IncrementalPotential &potential = solver_.potential();
+  PetscLogDouble begin, now;
+  PetscCall(PetscTime(&begin));
+  *finished = false;
+  PetscCall(findStart(state));
+  if (!failure_.empty()) PetscFunctionReturn(0);
+  Step load;
+  load.load_factor = 1;
+  load_->beginStep(state, potential.iterate(), load);
+
+  Point direction;
+  PetscCall(tangent(&direction));
+  const double first = settings_.dt / direction.factor; // as long as a load step of dt
+  const double shortest = first * (settings_.dt_min > 0 ? settings_.dt_min / settings_.dt : 1.0 / 1024);
+  double length = first;
+  int rejected = 0;
+  EnergyBudget before = energyBudget(potential.scene(), potential.elements(), state, state.time);
+  for (int taken = 0; taken < settings_.arclength_steps && state.time < settings_.t_end;) {
+    const State start = state;
+    const Point before_step = last_;
+    bool converged;
+    PetscCall(step(state, length, &converged));
+    const double slope = direction.factor;
+    Point end;
+    if (converged) PetscCall(tangent(&end));
+    // Full load lies before a limit point above it: shorter steps end on the near side.
+    if (converged && slope * end.factor < 0 && potential.step().time >= settings_.t_end) {
+      converged = false;
+      obstacle_ = "a limit point lies just above full load";
+    }
+    if (!converged) { // the state was not touched
+      last_ = before_step;
+      ++rejected;
+      length *= 0.5;
+      if (length >= shortest) continue;
+      std::ostringstream message;
+      message << "step along the path at factor " << state.time << " failed with length " << 2 * length << ": " << obstacle_ << " (" << iterations_
+              << " iterations)";
+      failure_ = message.str();
+      PetscFunctionReturn(0);
+    }
+    std::swap(direction, end);
+    potential.commit(state);
+    ++taken;
+    if (slope * direction.factor < 0) PetscCall(locateLimit(start, before_step, {slope, direction.factor}, length));
+    Diagnostics row;
+    row.time = state.time;
+    row.dt = std::sqrt(product(last_, last_));
+    row.energy = energyBudget(potential.scene(), potential.elements(), state, state.time);
+    row.dissipated = before.total() - row.energy.total();
+    before = row.energy;
+    row.newton_iterations = iterations_;
+    row.negative_pivots = negative_;
+    row.rejected_steps = std::exchange(rejected, 0);
+    PetscCall(PetscTime(&now));
+    row.wall_seconds = now - begin;
+    PetscCall(observe(state, row));
+    length = std::clamp(length * std::clamp(std::sqrt(wanted_iterations / std::max(iterations_, 1)), 0.5, 2.0), shortest, most_growth * first);
+  }
+  *finished = true;
+  PetscFunctionReturn(0);
+}
+
+} // namespace tendril

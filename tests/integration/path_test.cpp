@@ -1,0 +1,251 @@
+/// Paths of equilibria: critical loads by inertia (data/reference/buckling_loads.csv), limit points by arc length.
+#include "support/rods.hpp"
+#include "tendril/dynamics/arc_length.hpp"
+
+namespace tendril::test {
+namespace {
+
+constexpr double order_tolerance = 0.1; // asked of every boundary: 2.0 +- 0.1
+constexpr double load_tolerance = 5e-3; // asked of critical loads at 64 edges
+
+/// Value of data/reference/buckling_loads.csv.
+double criticalLoad(const std::string &id) {
+  std::ifstream in(std::string(TENDRIL_SOURCE_DIR) + "/data/reference/buckling_loads.csv");
+  for (std::string line; std::getline(in, line);)
+    if (line.rfind(id + ";", 0) == 0) return std::stod(line.substr(id.size() + 1));
+  ADD_FAILURE() << "no row " << id;
+  return 0;
+}
+
+struct Path {
+  std::vector<CriticalPoint> critical;
+  std::vector<double> factor, step;
+  std::vector<int> negative;
+  std::vector<State> states;
+  std::string failure;
+  State end;
+};
+
+Path follow(const Scene &scene, const LoopSettings &settings) {
+  Path path;
+  Simulation sim;
+  EXPECT_EQ(sim.setUp(scene, settings), PetscErrorCode(0));
+  bool finished = false;
+  auto critical = [&](const CriticalPoint &point) {
+    path.critical.push_back(point);
+    return PetscErrorCode(0);
+  };
+  auto observe = [&](const State &state, const Diagnostics &row) {
+    path.factor.push_back(row.time);
+    path.step.push_back(row.dt);
+    path.negative.push_back(row.negative_pivots);
+    path.states.push_back(state);
+    return PetscErrorCode(0);
+  };
+  if (settings.continuation == Continuation::arclength) {
+    ArcLength loop(sim.solver, settings);
+    loop.on_critical = critical;
+    EXPECT_EQ(loop.run(sim.state, observe, &finished), PetscErrorCode(0));
+    path.failure = loop.failure();
+  } else {
+    TimeLoop loop(sim.solver, settings);
+    loop.on_critical = critical;
+    EXPECT_EQ(loop.run(sim.state, observe, &finished), PetscErrorCode(0));
+    path.failure = loop.failure();
+  }
+  EXPECT_TRUE(finished) << path.failure;
+  path.end = sim.state;
+  return path;
+}
+
+LoopSettings stopping(int load_steps = 1) {
+  LoopSettings s = statics(load_steps);
+  s.bifurcation = Bifurcation::stop;
+  return s;
+}
+
+LoopSettings along(int load_steps, int steps) {
+  LoopSettings s = statics(load_steps);
+  s.continuation = Continuation::arclength;
+  s.arclength_steps = steps;
+  return s;
+}
+
+/// Critical load factor of a scene that has one.
+double criticalFactor(const Scene &scene, int load_steps = 1) {
+  const Path path = follow(scene, stopping(load_steps));
+  EXPECT_EQ(path.critical.size(), 1u);
+  if (path.critical.size() != 1) return 0;
+  EXPECT_FALSE(path.critical[0].limit);
+  EXPECT_EQ(path.end, *path.critical[0].state);
+  return path.critical[0].load_factor;
+}
+
+Scene column(int edges, double load) {
+  Scene scene = clampedScene(straightRod(edges));
+  scene.forces = {{0, edges, Vec3(-load, 0, 0)}};
+  return scene;
+}
+
+TEST(Buckling, EulerLoadOfAClampedColumnIsSecondOrder) {
+  const double exact = criticalLoad("euler_clamped_free"), full = 4;
+  std::array<double, 3> error{};
+  for (int k = 0; k < 3; ++k) error[k] = std::abs(full * criticalFactor(column(16 << k, full)) - exact);
+  EXPECT_NEAR(order(error[0], error[1]), 2, order_tolerance);
+  EXPECT_NEAR(order(error[1], error[2]), 2, order_tolerance);
+  EXPECT_LT(error[2], load_tolerance * exact);
+}
+
+TEST(Buckling, GreenhillsColumnUnderItsWeightIsSecondOrder) {
+  const double exact = criticalLoad("greenhill_clamped_free"), full = 12;
+  std::array<double, 3> error{};
+  for (int k = 0; k < 3; ++k) {
+    Scene scene = clampedScene(straightRod(16 << k));
+    scene.gravity = Vec3(-full, 0, 0);
+    error[k] = std::abs(full * criticalFactor(scene, 3) - exact);
+  }
+  EXPECT_NEAR(order(error[0], error[1]), 2, order_tolerance);
+  EXPECT_NEAR(order(error[1], error[2]), 2, order_tolerance);
+  EXPECT_LT(error[2], load_tolerance * exact);
+}
+
+/// Ends pushed together by 1e-3 of the length, EA L^2/EI = 1e5: the axial force at the critical state is the load.
+double shorteningLoad(int edges, Support::Kind first, Support::Kind last) {
+  Scene scene = clampedScene(straightRod(edges));
+  scene.rods[0].material.axial_stiffness = 1e5;
+  scene.supports = {hold(scene, 0, 0, first), hold(scene, 0, edges, last)};
+  if (first == Support::Kind::pin) scene.supports.push_back(hold(scene, 0, 0, Support::Kind::fix_twist));
+  scene.supports[1].motion.velocity = Vec3(-1e-3, 0, 0);
+  const Path path = follow(scene, stopping(2));
+  EXPECT_EQ(path.critical.size(), 1u);
+  return path.critical.size() == 1 ? -path.end.axial_force[0] : 0;
+}
+
+TEST(Buckling, AxialForceWhereEndsArePushedTogetherIsEulersLoad) {
+  using enum Support::Kind;
+  const struct {
+    const char *id;
+    Support::Kind first, last;
+  } cases[] = {{"euler_pinned_pinned", pin, pin}, {"euler_clamped_pinned", clamp, pin}, {"euler_clamped_clamped", clamp, clamp}};
+  for (const auto &c : cases) {
+    const double exact = criticalLoad(c.id);
+    const double coarse = std::abs(shorteningLoad(32, c.first, c.last) - exact), fine = std::abs(shorteningLoad(64, c.first, c.last) - exact);
+    EXPECT_NEAR(order(coarse, fine), 2, order_tolerance) << c.id;
+    EXPECT_LT(fine, load_tolerance * exact) << c.id;
+  }
+}
+
+TEST(Buckling, IsLocatedOnceAndTheRunGoesOnAlongTheStableBranch) {
+  LoopSettings settings = statics(8);
+  const Path located = follow(column(32, 4), settings);
+  EXPECT_EQ(located.critical.size(), 1u);
+  EXPECT_EQ(located.factor.back(), 1);
+  EXPECT_GT(located.end.position.back().tail<2>().norm(), 0.1);
+  EXPECT_EQ(located.negative.back(), 0);
+  settings.bifurcation = Bifurcation::off;
+  EXPECT_TRUE(follow(column(32, 4), settings).critical.empty());
+}
+
+TEST(Buckling, IsNotReportedForCouples) {
+  Scene scene = clampedScene(straightRod(32));
+  scene.moments = {{0, 31, 0, Vec3(0, 0, 2 * pi)}};
+  EXPECT_TRUE(follow(scene, statics(4)).critical.empty());
+}
+
+TEST(LoadSteps, GrowToFourTimesTheFirstWhereNewtonIsQuick) {
+  Scene scene = clampedScene(straightRod(16));
+  scene.forces = {{0, 16, Vec3(0, -0.5, 0)}};
+  const Path path = follow(scene, statics(64));
+  EXPECT_DOUBLE_EQ(*std::max_element(path.step.begin(), path.step.end()), 4.0 / 64);
+  EXPECT_EQ(path.factor.back(), 1);
+}
+
+TEST(ArcLength, EndsAtFullLoadWhereLoadStepsEnd) {
+  Scene scene = clampedScene(straightRod(32));
+  scene.forces = {{0, 32, Vec3(0, -5, 0)}};
+  const Path load = follow(scene, statics()), path = follow(scene, along(10, 200));
+  ASSERT_EQ(path.end.time, 1);
+  for (std::size_t v = 0; v < load.end.position.size(); ++v)
+    EXPECT_LT((path.end.position[v] - load.end.position[v]).norm(), 1e-6); // both converged to 1e-6 of the load
+  EXPECT_TRUE(path.critical.empty());
+}
+
+/// Deep circular arch of 215 degrees, clamped at one end and hinged at the other, pushed down at the crown: DaDeppo & Schmidt (1975).
+/// Stiff out of its plane, for the path lies in it.
+Scene deepArch(int edges, double load, Measure measure = Measure::angle) {
+  const double radius = 100, half = 107.5 * pi / 180;
+  Rod rod;
+  rod.name = "arch";
+  rod.measure = measure;
+  for (int i = 0; i <= edges; ++i) {
+    const double angle = half * (1 - 2.0 * i / edges);
+    rod.position.emplace_back(-radius * std::sin(angle), radius * std::cos(angle), 0);
+  }
+  rod.material = {1, 1e-6, 1e8, 1e9, {1e6, 1e9}, 0, 0};
+  setBishopDirectors(rod, Vec3::UnitZ());
+  Scene scene;
+  scene.gravity = Vec3::Zero();
+  scene.rods = {rod};
+  scene.supports = {hold(scene, 0, 0, Support::Kind::clamp), hold(scene, 0, edges, Support::Kind::pin)};
+  scene.forces = {{0, edges / 2, Vec3(0, -load, 0)}};
+  return scene;
+}
+
+double limitLoad(int edges, int load_steps) {
+  const Path path = follow(deepArch(edges, 1000), along(load_steps, 200));
+  EXPECT_EQ(path.critical.size(), 2u); // the limit load and, below zero, the one from which it rises again
+  EXPECT_EQ(path.end.time, 1);
+  if (path.critical.empty()) return 0;
+  EXPECT_TRUE(path.critical[0].limit);
+  return 1000 * path.critical[0].load_factor;
+}
+
+TEST(ArcLength, LimitLoadOfTheDeepArchIsSecondOrder) {
+  const double exact = 8.97 * 1e6 / 1e4, load = limitLoad(64, 20);
+  EXPECT_NEAR(load, exact, 0.01 * exact); // the reference has three digits
+  EXPECT_NEAR(order(load - limitLoad(32, 20), limitLoad(128, 20) - load), 2, order_tolerance);
+  EXPECT_NEAR(limitLoad(64, 80), load, 1e-6 * load); // a point of the path, however the steps fall: to the solver's 1e-6 of the load
+}
+
+TEST(ArcLength, LoadFallsAndOnePivotIsNegativeBehindTheLimitPoint) {
+  const Path path = follow(deepArch(64, 1000), along(20, 24));
+  ASSERT_EQ(path.critical.size(), 1u);
+  EXPECT_EQ(path.factor.size(), 24u);
+  EXPECT_LT(path.end.time, 0.8 * path.critical[0].load_factor);
+  for (std::size_t k = 1; k < path.factor.size(); ++k) EXPECT_EQ(path.negative[k], path.factor[k] < path.factor[k - 1] ? 1 : 0) << k;
+}
+
+TEST(ArcLength, RollsTheRodIntoACircleByACouple) {
+  Scene scene = clampedScene(straightRod(32, Measure::angle));
+  scene.moments = {{0, 31, 0, Vec3(0, 0, 2 * pi)}};
+  const Path path = follow(scene, along(4, 200));
+  EXPECT_EQ(path.end.time, 1);
+  EXPECT_LT(path.end.position.back().norm(), 1e-6); // every vertex turns by exactly 2 pi/n; the solver's 1e-6 of the load
+}
+
+TEST(ArcLength, FailureKeepsTheStateAndSaysWhy) {
+  Scene scene = deepArch(16, 1000);
+  scene.forces[0].force.y() = std::nan("");
+  const LoopSettings settings = along(20, 60);
+  Simulation sim;
+  EXPECT_PETSC(sim.setUp(scene, settings));
+  const State before = sim.state;
+  ArcLength path(sim.solver, settings);
+  bool finished = true;
+  EXPECT_PETSC(path.run(sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+  EXPECT_FALSE(finished);
+  EXPECT_EQ(sim.state, before);
+  EXPECT_NE(path.failure().find("not finite"), std::string::npos) << path.failure();
+}
+
+TEST(ArcLength, RefusesPrescribedMotionsAndScenesWithoutLoad) {
+  Scene scene = clampedScene(straightRod(4));
+  EXPECT_THROW(requireDeadLoads(scene), SceneError);
+  scene.gravity = Vec3(0, -1, 0);
+  EXPECT_NO_THROW(requireDeadLoads(scene));
+  scene.supports[0].motion.velocity = Vec3(1, 0, 0);
+  EXPECT_THROW(requireDeadLoads(scene), SceneError);
+}
+
+} // namespace
+} // namespace tendril::test
