@@ -243,6 +243,7 @@ PetscErrorCode ArcLength::locateLimit(const State &start, const Point &before, c
 
 PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, bool *finished) {
   constexpr double wanted_iterations = 4, most_growth = 4;
+  constexpr double least_alignment = 0.5; // of the tangents at the ends of a step, 60 degrees
   PetscFunctionBeginUser;
   IncrementalPotential &potential = solver_.potential();
   PetscLogDouble begin, now;
@@ -268,7 +269,18 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     PetscCall(step(state, length, &converged));
     const double slope = direction.factor;
     Point end;
-    if (converged) PetscCall(tangent(&end));
+    if (converged) {
+      const int negative = negative_;
+      PetscCall(tangent(&end));
+      // At a limit point an odd number of pivots and the slope change sign together. Pivots alone: a bifurcation, or a turn so sharp that the
+      // tangent behind it was taken for the reverse of the tangent before. Short steps tell.
+      const bool odd = (negative - negative_) % 2 != 0, turns = slope * end.factor < 0;
+      const bool doubtful = odd && !turns && potential.scene().moments.empty() && length > first / 16;
+      if (doubtful || product(direction, end) < least_alignment) {
+        converged = false;
+        obstacle_ = "the path turns too sharply";
+      }
+    }
     // Full load lies before a limit point above it: shorter steps end on the near side.
     if (converged && slope * end.factor < 0 && potential.step().time >= settings_.t_end) {
       converged = false;

@@ -207,6 +207,16 @@ TEST(ArcLength, LimitLoadOfTheDeepArchIsSecondOrder) {
   EXPECT_NEAR(limitLoad(64, 80), load, 1e-6 * load); // a point of the path, however the steps fall: to the solver's 1e-6 of the load
 }
 
+TEST(ArcLength, DoesNotTurnBackAtASharpLimitPoint) {
+  for (const int steps : {10, 20, 40})
+    for (const Measure measure : {Measure::tan, Measure::angle}) {
+      const Path path = follow(deepArch(64, 1000, measure), along(steps, 200));
+      EXPECT_EQ(path.critical.size(), 2u) << steps;
+      EXPECT_EQ(path.end.time, 1) << steps;
+      EXPECT_LT(path.end.position[32].y(), -100) << steps; // snapped through, as far as load steps find it: y = -108
+    }
+}
+
 TEST(ArcLength, LoadFallsAndOnePivotIsNegativeBehindTheLimitPoint) {
   const Path path = follow(deepArch(64, 1000), along(20, 24));
   ASSERT_EQ(path.critical.size(), 1u);
@@ -232,10 +242,21 @@ TEST(ArcLength, FailureKeepsTheStateAndSaysWhy) {
   const State before = sim.state;
   ArcLength path(sim.solver, settings);
   bool finished = true;
-  EXPECT_PETSC(path.run(sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+  EXPECT_PETSC(path.run(
+      sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
   EXPECT_FALSE(finished);
   EXPECT_EQ(sim.state, before);
   EXPECT_NE(path.failure().find("not finite"), std::string::npos) << path.failure();
+}
+
+TEST(ArcLength, StaysOnTheUnstableBranchBeyondABifurcation) {
+  Scene scene = column(32, 4);
+  scene.rods[0].material.flexural_stiffness = {1, 4}; // one pivot at a time
+  const Path path = follow(scene, along(10, 200));
+  EXPECT_EQ(path.end.time, 1);
+  EXPECT_EQ(path.negative.back(), 1);
+  EXPECT_EQ(path.negative.front(), 0);
+  EXPECT_LT(path.end.position.back().tail<2>().norm(), 1e-9); // straight but for rounding
 }
 
 TEST(ArcLength, RefusesPrescribedMotionsAndScenesWithoutLoad) {
