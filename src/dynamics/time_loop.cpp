@@ -35,9 +35,9 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
   PetscFunctionBeginUser;
   const IncrementalPotential &potential = solver_.potential();
   const double dt_min = settings_.dt_min > 0 ? settings_.dt_min : settings_.dt / 1024;
-  double dt = settings_.dt;
-  int rejected = 0, good = 0;
-  bool stable = true;
+  if (control.dt == 0) control.dt = settings_.dt;
+  auto &[dt, good, stable] = control;
+  int rejected = 0;
   PetscLogDouble begin, now;
   PetscCall(PetscTime(&begin));
   EnergyBudget before = energyBudget(potential.scene(), potential.elements(), state, settings_.dynamic ? 1 : state.time);

@@ -32,7 +32,9 @@ const std::vector<Entry> &entries() {
         {"gravity", "acceleration of gravity, e.g. 0,-9.81,0 [m/s^2]", "(from the scene)"},
         {"output_dir", "folder for the results", "out"},
         {"output_interval", "time between frames: the first step at or after each multiple is written; 0: every step [s]", "0"},
-        {"output_fields", "fields of a frame besides the position: director,velocity,twist_rate,axial_force", "all"},
+        {"checkpoint_interval", "steps between checkpoints; 0: only at the end", "0"},
+        {"restart", "checkpoint of the same scene to go on from, to the same bits; the results go to another folder", "(none)"},
+        {"output_fields", "fields of a frame besides the position: director,velocity,twist_rate,axial_force,turns", "all"},
         {"retraction", "how positions move: additive (straight), or length (keeping the linearised lengths of the edges)", "length"},
         {"stretch", "axial force: primal (from the strain), or mixed (an unknown of its own)", "mixed"},
         {"hessian", "exact, or gauss_newton (without second derivatives of the strains; for comparison)", "exact"},
@@ -169,6 +171,10 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
     o->output_interval = texts.number("output_interval");
     if (o->output_interval < 0) fail("output_interval", "must not be negative, found '" + texts.at("output_interval") + "'");
   }
+  if (texts.has("checkpoint_interval")) {
+    if (texts.at("checkpoint_interval") != "0") o->checkpoint_interval = texts.count("checkpoint_interval");
+  }
+  if (texts.has("restart")) o->restart = texts.at("restart");
   o->fields = readFields(texts);
   if (texts.has("retraction"))
     o->loop.retraction = texts.oneOf("retraction", {"additive", "length"}) == "additive" ? RetractionKind::additive : RetractionKind::length;
@@ -257,6 +263,8 @@ void writeOptionsFile(const std::string &path, const Options &o, const Provenanc
   list(scene.gravity.data(), scene.gravity.data() + 3);
   put("output_dir", o.output_dir);
   put("output_interval", o.output_interval);
+  put("checkpoint_interval", o.checkpoint_interval);
+  if (!o.restart.empty()) put("restart", o.restart);
   out << YAML::Key << "output_fields" << YAML::Value;
   list(o.fields.begin(), o.fields.end());
   put("retraction", o.loop.retraction == RetractionKind::length ? "length" : "additive");

@@ -2,6 +2,7 @@
 
 #include "tendril/dynamics/arc_length.hpp"
 #include "tendril/dynamics/simulation.hpp"
+#include "tendril/io/checkpoint.hpp"
 #include "tendril/io/options.hpp"
 #include "tendril/io/progress.hpp"
 #include "tendril/solver/events.hpp"
@@ -135,6 +136,16 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
   }
   if (o.help) PetscFunctionReturn(0);
   PetscCall(refuseUnknownOptions());
+  TimeLoop loop(run.solver, o.loop);
+  if (!o.restart.empty()) {
+    if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength) throw SceneError("option -restart: -continuation arclength cannot be taken up again");
+    readCheckpoint(o.restart, &run.state, &loop.control);
+    std::error_code none;
+    if (std::filesystem::equivalent(std::filesystem::absolute(o.restart).parent_path(), o.output_dir, none))
+      throw SceneError("option -restart: the results would replace those beside the checkpoint '" + o.restart + "'; choose another -output_dir");
+    if (!(run.state.time < o.loop.t_end))
+      throw SceneError("option -restart: the checkpoint is at time " + std::to_string(run.state.time) + ", nothing is left to do; write a larger -t_end");
+  }
   makeFolder(o.output_dir);
   const Provenance origin = provenance(argc, argv);
   writeOptionsFile(o.output_dir + "/options.yaml", o, origin, run.scene);
@@ -149,7 +160,8 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
   for (std::size_t k = 0; k < Diagnostics::names().size(); ++k) csv << (k ? "," : "") << Diagnostics::names()[k];
   csv << std::endl;
   trajectory.writeFrame(run.state);
-  double next_output = o.output_interval;
+  double next_output = o.output_interval > 0 ? o.output_interval * (1 + std::floor(run.state.time / o.output_interval * (1 + 1e-12))) : 0;
+  const std::string checkpoint = o.output_dir + "/checkpoint.h5";
   long steps = 0, iterations = 0, rejected = 0;
   double wall = 0;
   bool warned = false;
@@ -169,6 +181,7 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
       trajectory.writeFrame(state);
       while (o.output_interval > 0 && next_output <= state.time * (1 + 1e-12)) next_output += o.output_interval;
     }
+    if (o.checkpoint_interval > 0 && state.step % o.checkpoint_interval == 0) writeCheckpoint(checkpoint, state, loop.control);
     progress.step(row);
     if (!o.loop.dynamic && row.negative_pivots > 0 && !warned) {
       progress.say("warning: " + std::to_string(row.negative_pivots) + " negative pivots at an accepted state with couples: couples have no potential, so its stability is not known");
@@ -195,11 +208,11 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
     PetscCall(path.run(run.state, observe, &finished));
     failure = path.failure();
   } else {
-    TimeLoop loop(run.solver, o.loop);
     loop.on_critical = critical;
     PetscCall(loop.run(run.state, observe, &finished));
     failure = loop.failure();
   }
+  if (!arclength) writeCheckpoint(checkpoint, run.state, loop.control);
   PetscCall(PetscLogStagePop());
   std::ostringstream summary;
   summary << steps << " steps, " << iterations << " Newton iterations (mean " << std::setprecision(3) << (steps ? double(iterations) / double(steps) : 0) << "), " << rejected

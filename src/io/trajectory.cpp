@@ -8,20 +8,24 @@
 namespace tendril {
 namespace {
 
+enum class On { vertices, edges, cells };
 struct Field {
   const char *name;
-  bool on_vertices;
+  On place;
   hsize_t components;
   const double *(*data)(const State &);
 };
 
 const Field fields[] = {
-    {"position", true, 3, [](const State &s) { return s.position[0].data(); }},
-    {"director", false, 3, [](const State &s) { return s.director[0].data(); }},
-    {"velocity", true, 3, [](const State &s) { return s.velocity[0].data(); }},
-    {"twist_rate", false, 1, [](const State &s) { return s.twist_rate.data(); }},
-    {"axial_force", false, 1, [](const State &s) { return s.axial_force.data(); }},
+    {"position", On::vertices, 3, [](const State &s) { return s.position[0].data(); }},
+    {"director", On::edges, 3, [](const State &s) { return s.director[0].data(); }},
+    {"velocity", On::vertices, 3, [](const State &s) { return s.velocity[0].data(); }},
+    {"twist_rate", On::edges, 1, [](const State &s) { return s.twist_rate.data(); }},
+    {"axial_force", On::edges, 1, [](const State &s) { return s.axial_force.data(); }},
+    {"turns", On::cells, 1, [](const State &s) { return s.turns.data(); }}, // measure `angle`: 2 pi x whole turns of each cell's twist [rad]
 };
+
+std::array<int, 3> sizes(const Elements &e) { return {int(e.mass.size()), int(e.vertex0.size()), e.cells.size()}; }
 
 template <class Get> std::vector<double> perRod(const Scene &scene, Get get) {
   std::vector<double> values;
@@ -81,7 +85,8 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
   file_.createGroup("state");
   for (const Field &f : fields) {
     if (std::string(f.name) != "position" && !wanted.count(f.name)) continue;
-    std::vector<hsize_t> slab{hsize_t(f.on_vertices ? vertices_ : edges_)};
+    if (f.place == On::cells && std::find(elements.measure.begin(), elements.measure.end(), Measure::angle) == elements.measure.end()) continue;
+    std::vector<hsize_t> slab{hsize_t(sizes(elements)[std::size_t(f.place)])};
     if (f.components > 1) slab.push_back(f.components);
     state_.emplace_back(f.name, std::make_unique<Hdf5Series>(file_, std::string("state/") + f.name, slab));
   }
@@ -195,7 +200,7 @@ void TrajectoryWriter::writeXdmf() const {
     // One frame out of a dataset (nt, n[, 3]). ParaView takes the first text in here as the geometry's name: it keeps what it read under that
     // name, and complains when there is none.
     auto frameOf = [&](const Field &f, std::size_t frame) {
-      const std::string shape = std::to_string(f.on_vertices ? vertices_ : edges_) + (f.components > 1 ? " " + std::to_string(f.components) : "");
+      const std::string shape = std::to_string(f.place == On::vertices ? vertices_ : edges_) + (f.components > 1 ? " " + std::to_string(f.components) : "");
       out << "     <DataItem ItemType=\"HyperSlab\" Dimensions=\"" << shape << "\"><!-- frame " << frame << " --><DataItem Dimensions=\"3 "
           << (f.components > 1 ? 3 : 2) << "\" Format=\"XML\">" << frame << (f.components > 1 ? " 0 0 1 1 1 1 " : " 0 1 1 1 ") << shape << "</DataItem>";
       dataset(std::string("state/") + f.name, std::to_string(nt) + " " + shape, "Float", 8);
@@ -219,9 +224,9 @@ void TrajectoryWriter::writeXdmf() const {
         out << "    </Geometry>\n";
         for (const Field &f : fields) {
           const bool written = std::any_of(state_.begin(), state_.end(), [&](const auto &s) { return s.first == f.name; });
-          if (&f == &fields[0] || !written || (!f.on_vertices && !edges)) continue;
+          if (&f == &fields[0] || !written || f.place == On::cells || (f.place == On::edges && !edges)) continue;
           out << "    <Attribute Name=\"" << f.name << "\" AttributeType=\"" << (f.components > 1 ? "Vector" : "Scalar") << "\" Center=\""
-              << (f.on_vertices ? "Node" : "Cell") << "\">\n";
+              << (f.place == On::vertices ? "Node" : "Cell") << "\">\n";
           frameOf(f, frame);
           out << "    </Attribute>\n";
         }

@@ -563,6 +563,7 @@ PetscErrorCode NewtonSolver::solve(const State &start, const Step &step, NewtonR
   PetscFunctionBeginUser;
   report_ = {};
   sharpness_ = 1;
+  shift_ = 0; // a step depends on its start alone
   potential_->beginStep(start, step);
   if (guess)
     potential_->moveTo(*guess);

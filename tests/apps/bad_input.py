@@ -127,6 +127,9 @@ rows = [
     ("no such factorisation", None, ["-pc_factor_mat_solver_type", "nosuch"], ["setting up the solvers", "nosuch"]),
     ("limit that is a word", None, ["-snes_max_it", "abc"], ["setting up the solvers", "abc"]),
     ("tolerance that is a word", None, ["-snes_rtol", "abc"], ["command line", "abc"]),
+    ("no checkpoint", None, ["-restart", "nowhere.h5"], ["nowhere.h5", "not a readable HDF5 file"]),
+    ("checkpoint of nothing", None, ["-restart", "file"], ["file", "not a readable HDF5 file"]),
+    ("half a checkpoint interval", None, ["-checkpoint_interval", "0.5"], ["-checkpoint_interval", "whole number"]),
     ("unwritable folder", None, ["-output_dir", "file/out"], ["-output_dir", "cannot be written"]),
     # the file as a whole
     ("empty scene", None, ["-scene", "empty.yaml"], ["empty.yaml:1", "is empty", "rods"]),

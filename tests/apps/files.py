@@ -28,10 +28,11 @@ def run(out, *options):
 
 
 with tempfile.TemporaryDirectory() as tmp:
-    whole, options = tmp + "/whole", ["-dt", "1e-3", "-t_end", "1"]
+    whole, options = tmp + "/whole", ["-dt", "1e-3", "-t_end", "1", "-checkpoint_interval", "10"]
     subprocess.run(run(whole, *options), check=True, stdout=subprocess.DEVNULL)
     times, fields = read(whole + "/trajectory.h5")
     assert len(times) == 1001
+    restarted = 0
     for wait in (0.05, 0.1, 0.17):
         out = f"{tmp}/killed{wait}"
         process = subprocess.Popen(run(out, *options), stdout=subprocess.DEVNULL)
@@ -47,6 +48,16 @@ with tempfile.TemporaryDirectory() as tmp:
         rows = open(out + "/diagnostics.csv").read().splitlines()
         assert len(rows) >= len(t) - 1 and rows[0].startswith("time,dt")
         print("killed after", len(t), "frames: all readable and equal")
+        if not os.path.exists(out + "/checkpoint.h5"):
+            continue
+        subprocess.run(run(out + "/on", *options, "-restart", out + "/checkpoint.h5"), check=True, stdout=subprocess.DEVNULL)
+        t, f = read(out + "/on/trajectory.h5")
+        for name, values in f.items():
+            assert np.array_equal(values, fields[name][-len(t) :]), f"{name}: differs after a restart"
+        restarted += 1
+        print("restarted", len(t) - 1, "steps before the end: the same bits")
+
+    assert restarted > 0, "no run lived long enough to write a checkpoint"
 
     short = tmp + "/short"
     subprocess.run(run(short, "-dt", "0.01", "-t_end", "0.1"), check=True, stdout=subprocess.DEVNULL)

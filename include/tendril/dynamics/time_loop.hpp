@@ -26,10 +26,18 @@ struct LoopSettings {
   RetractionKind retraction = RetractionKind::length;
 };
 
+/// How a loop is stepping: with the state, all that goes on from step to step.
+struct StepControl {
+  double dt = 0;      ///< of the next step [s, or load factor]; 0: that of the settings
+  int good = 0;       ///< steps since the last rejection
+  bool stable = true; ///< statics: the last state was a minimum
+};
+
 /// Takes steps and tells the observer of each one accepted.
 class TimeLoop {
 public:
   using Observer = std::function<PetscErrorCode(const State &, const Diagnostics &)>;
+  StepControl control;
   CriticalObserver on_critical; ///< told of each critical point, before the step beyond it
   TimeLoop(NewtonSolver &solver, const LoopSettings &settings) : solver_(solver), settings_(settings) {}
 

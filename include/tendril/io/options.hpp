@@ -25,6 +25,8 @@ struct Options {
   std::optional<Vec3> gravity;
   std::string output_dir = "out";
   double output_interval = 0;
+  int checkpoint_interval = 0; ///< steps; 0: only at the end
+  std::string restart;         ///< checkpoint to go on from, or empty
   std::set<std::string> fields;
 };
 
