@@ -141,6 +141,18 @@ double IncrementalPotential::energy(const Configuration &configuration) const {
   return sum;
 }
 
+/// How much stiffer than at rest the steepest cell of a rod is: near 180 degrees of fold or twist the measure `tan` grows without bound, with the
+/// square of its slope 1/cos^2 of half the angle, and so does what rounding leaves in forces.
+double IncrementalPotential::steepnessOf(const Configuration &c, int r) const {
+  if (elements_.measure[r] != Measure::tan) return 1;
+  double flattest = 1;
+  for (int n = elements_.rod_cells[r]; n < elements_.rod_cells[r + 1]; ++n) {
+    const double turning = 0.5 * (1 + c.frame[elements_.cells.frame0[n]].tangent.dot(c.frame[elements_.cells.frame1[n]].tangent)); // cos^2 of half
+    flattest = std::min({flattest, turning, 0.5 * (1 + std::cos(c.twist[n]))});
+  }
+  return 1 / std::max(flattest * flattest, epsilon);
+}
+
 /// Coordinates carry an error of epsilon x reach, which is a strain of delta = epsilon reach / h in an edge of length h and an angle as large in
 /// a cell: each costs (force + stiffness delta) delta of energy. On top of it comes the rounding of the sums.
 double IncrementalPotential::energyNoise(const Configuration &configuration) const {
@@ -155,13 +167,14 @@ double IncrementalPotential::energyNoise(const Configuration &configuration) con
       noise += (force + axial_.stiffness[i] * delta) * delta * elements_.rest_length[i];
     }
     double bending = 0, delta = 0;
+    const double steepness = steepnessOf(configuration, int(r));
     for (int c = elements_.rod_cells[r]; c < elements_.rod_cells[r + 1]; ++c) {
       delta = std::max(delta, epsilon * reach / elements_.cells.length[c]);
       bending += elements_.cells.stiffness[0][c] + elements_.cells.stiffness[1][c] + elements_.cells.stiffness[2][c];
     }
     for (const auto &term : terms_) {
       const double energy = std::abs(term->energy(configuration, int(r)));
-      noise += 64 * epsilon * energy + delta * (std::sqrt(2 * energy * bending) + bending * delta);
+      noise += 64 * epsilon * energy + delta * (std::sqrt(2 * energy * bending * steepness) + bending * steepness * delta);
     }
   }
   return noise;
@@ -287,7 +300,7 @@ IncrementalPotential::Residual IncrementalPotential::residual() {
     }
     // Coordinates carry an error of epsilon x reach: strains of epsilon reach/h, which the stiffnesses turn into forces and moments.
     const double strain_noise = epsilon * reach / shortest, count = std::sqrt(double(rod.vertices));
-    const double bending = std::max({m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness}) / shortest;
+    const double bending = steepnessOf(iterate_, int(r)) * std::max({m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness}) / shortest;
     const double scale = force_scale_[r], stretching = step_.mixed ? tension : tension + m.axial_stiffness;
     result.force = std::max(result.force, std::sqrt(force) / scale);
     result.moment = std::max(result.moment, std::sqrt(moment) / (scale * length_[r]));

@@ -336,7 +336,7 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   }
   // A full step that gained clearly more than a quadratic would: the minimum lies beyond, as on the way down from a barrier.
   const double gain = (energy_ - energy_before) / slope;
-  if (accepted && lambda == 1 && gain > 0.6 && gain < 1) {
+  if (accepted && lambda == 1 && gain > 0.6 && gain < 1 && -slope > 1e3 * noise) {
     std::swap(trial_, shorter_);
     const double longer = std::min(2.0, 0.5 / (1 - gain));
     const double energy = potential_->tryMove(increment_, longer, trial_) ? potential_->energy(trial_) : HUGE_VAL;

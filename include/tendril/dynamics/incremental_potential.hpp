@@ -81,6 +81,7 @@ private:
   std::vector<double> load_, force_scale_, length_; ///< per rod: loads [N], or 0; the present scale of forces [N]
   bool beyond_barrier_ = false;
 
+  double steepnessOf(const Configuration &configuration, int rod) const;
   void turnSupports();
   void setForceScales();
 };
