@@ -169,7 +169,7 @@ double IncrementalPotential::energyNoise(const Configuration &configuration) con
     double bending = 0, delta = 0;
     const double steepness = steepnessOf(configuration, int(r));
     for (int c = elements_.rod_cells[r]; c < elements_.rod_cells[r + 1]; ++c) {
-      delta = std::max(delta, epsilon * reach / elements_.cells.length[c]);
+      delta = std::max(delta, 4 * epsilon * reach / elements_.cells.length[c]); // edge, length, tangent and binormal each round
       bending += elements_.cells.stiffness[0][c] + elements_.cells.stiffness[1][c] + elements_.cells.stiffness[2][c];
     }
     for (const auto &term : terms_) {

@@ -2,6 +2,8 @@
 #include "support/random_cell.hpp"
 #include "support/rods.hpp"
 
+#include "tendril/energy/edge.hpp"
+
 namespace tendril::test {
 namespace {
 
@@ -33,6 +35,78 @@ TEST(FreeFlight, OfASlowLightRodKeepsItsVelocity) {
   Simulation sim;
   runTo(sim, freeScene(rod), dynamics(1e-3, 1e-2));
   for (const Vec3 &v : sim.state.velocity) EXPECT_NEAR(v[0], 1e-3, 1.1e-7); // ten steps, each to 1e-6 of the momentum of eleven vertices
+}
+
+/// The state is turned as a whole, ten thousand times, by the same moves that a step makes: additive increments of positions, twist increments
+/// beyond parallel transport, directors made orthonormal at the end. Parallel transport itself depends on the path; strains must not.
+TEST(RigidMotion, RepeatedTenThousandTimesLeavesTheStrains) {
+  Simulation sim;
+  EXPECT_PETSC(sim.setUp(springScene(), dynamics(0.01, 1)));
+  runTo(sim, springScene(), dynamics(0.02, 0.2)); // bent and twisted
+  State s = sim.state;
+  const Elements &e = *sim.elements;
+  auto strains = [&] {
+    std::vector<double> all;
+    const Configuration c = configurationOf(s, sim.scene, e, 0);
+    for (int n = 0; n < e.cells.size(); ++n)
+      if (e.cells.free[0][n] * e.cells.free[1][n] == 1) // not the half cell of the clamp, whose frame stays
+        for (const double strain : presentStrain(e, c, 0, n)) all.push_back(strain);
+    all.insert(all.end(), c.strain.begin(), c.strain.end());
+    return all;
+  };
+  const std::vector<double> before = strains();
+  Random random(18);
+  for (int step = 0; step < 10000; ++step) {
+    const Mat3 r = Eigen::AngleAxisd(1.5 * random(), random.direction()).toRotationMatrix();
+    const Vec3 centre = s.position[20]; // stays near the origin
+    for (std::size_t i = 0; i < s.director.size(); ++i) {
+      const Frame f{(s.position[i + 1] - s.position[i]).normalized(), s.director[i], 1}, turned{r * f.tangent, r * f.director, 1};
+      const double beyond = twistIncrement(f, turned);
+      s.director[i] = orthonormalised(rotateAbout<double>(transport<double>(f.director, f.tangent, turned.tangent), turned.tangent, beyond), turned.tangent);
+    }
+    for (Vec3 &x : s.position) x = centre + r * (x - centre);
+  }
+  const std::vector<double> after = strains();
+  for (std::size_t k = 0; k < before.size(); ++k) EXPECT_NEAR(after[k], before[k], 1e-12);
+}
+
+/// A clamp led around a closed loop brings the rod back to the energy it had.
+TEST(ClosedLoop, OfAClampReturnsTheEnergy) {
+  Scene scene = clampedScene(straightRod(24, Measure::angle));
+  scene.supports.push_back(hold(scene, 0, 24, Support::Kind::clamp));
+  scene.supports[1].motion.table = {{0, Vec3(-0.2, 0, 0), Vec3(0, 0, 0.5)},         {0.25, Vec3(-0.3, 0.1, 0), Vec3(0, 0.4, 0.5)}, {0.5, Vec3(-0.3, 0.1, 0.2), Vec3(0.6, 0.4, 0)},
+                                    {0.75, Vec3(-0.2, -0.1, 0.1), Vec3(0.3, 0, 1)}, {1, Vec3(-0.2, 0, 0), Vec3(0, 0, 0.5)}};
+  EXPECT_PETSC(PetscOptionsSetValue(nullptr, "-snes_rtol", "1e-10"));
+  Simulation sim;
+  const LoopSettings settings = statics(16);
+  EXPECT_PETSC(sim.setUp(scene, settings));
+  std::vector<double> energies;
+  NewtonReport report;
+  for (const double time : {1e-12, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0}) {
+    EXPECT_PETSC(sim.solver.solve(sim.state, TimeLoop::stepOf(settings, sim.state, time - sim.state.time), &report));
+    ASSERT_TRUE(report.converged) << time << ": " << report.reason;
+    sim.potential->commit(sim.state);
+    energies.push_back(energyBudget(sim.scene, *sim.elements, sim.state, 1).total());
+  }
+  EXPECT_PETSC(PetscOptionsClearValue(nullptr, "-snes_rtol"));
+  EXPECT_GT(energies[5], 1.1 * energies[0]); // it went somewhere
+  EXPECT_NEAR(energies.back(), energies.front(), 1e-10 * energies.front()); // the first point lies 1e-12 along the loop
+}
+
+/// A load that is not a number, as a faulty coupling would give: every step is rejected, the state stays bit for bit, the reason is told.
+TEST(TimeLoop, RejectsALoadThatIsNotANumber) {
+  Scene scene = clampedScene(straightRod(8));
+  scene.forces.push_back({0, 8, Vec3(0, NAN, 0)});
+  Simulation sim;
+  const LoopSettings settings = dynamics(0.01, 0.1);
+  EXPECT_PETSC(sim.setUp(scene, settings));
+  const State before = sim.state;
+  TimeLoop loop(sim.solver, settings);
+  bool finished = true;
+  EXPECT_PETSC(loop.run(sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+  EXPECT_FALSE(finished);
+  EXPECT_TRUE(sim.state == before);
+  EXPECT_NE(loop.failure().find("not finite"), std::string::npos) << loop.failure();
 }
 
 TEST(FoldBarrier, IsNotSteppedOver) {
