@@ -245,13 +245,15 @@ PetscErrorCode NewtonSolver::shiftUntilPositive(KSP ksp, Vec f, Vec y, int negat
   OwnedVec diagonal;
   PetscScalar *values;
   PetscCall(VecDuplicate(f, diagonal.out()));
-  if (shift_ == 0) { // the slowest bending wave of the stiffest rod, EI/(rho L^4), or the edge's own axial one for a cable
+  if (shift_ == 0) { // the slowest bending wave of the rod where it is fastest, EI/(rho L^4), or the edge's own axial one for a cable
     const Scene &scene = potential_->scene();
     for (const Rod &rod : scene.rods) {
       double length = 0;
       for (int i = 0; i < rod.edges(); ++i) length += rod.edge(i).norm();
       const Material &m = rod.material;
-      const double stiffness = m.isCable() ? 1e-6 * m.axial_stiffness : 10 * std::max(m.flexural_stiffness[0], m.flexural_stiffness[1]) / (length * length);
+      const auto [k1, k2] = m.flexural_stiffness;
+      const double softest = k1 > 0 && k2 > 0 ? std::min(k1, k2) : std::max(k1, k2);
+      const double stiffness = m.isCable() ? 1e-6 * m.axial_stiffness : 10 * softest / (length * length);
       shift_ = std::max(shift_, stiffness / (m.linear_density * length * length));
     }
   } else
@@ -423,7 +425,7 @@ PetscErrorCode NewtonSolver::findBucklingMode(bool *found) {
   };
   normalise();
   right = softening();
-  for (int k = 0; k < 40 && !*found; ++k) {
+  for (int k = 0; k < 100 && !*found; ++k) {
     PetscCall(potential_->dofs().gather(right, f));
     PetscCall(KSPSolve(ksp, f, y));
     increment_.assign(dofs.rows(), 0.0);
