@@ -230,7 +230,8 @@ bool IncrementalPotential::tryMove(const std::vector<double> &increment, double 
       // dS = k (B d + c): the force the linearised strain asks for.
       const int row = elements_.edge_row[i];
       const Vec3 de = Eigen::Map<const Vec3>(&increment[row + rod.stride]) - Eigen::Map<const Vec3>(&increment[row]);
-      const double strain = iterate_.strain[i] + f.length * f.tangent.dot(de) * inverse * inverse;
+      const double change = f.length * f.tangent.dot(de) - (retraction.continues ? 0.5 * de.squaredNorm() : 0.0);
+      const double strain = iterate_.strain[i] + change * inverse * inverse;
       trial.axial_force[i] = iterate_.axial_force[i] + scale * (axial_.stiffness[i] * (strain - axial_.rest[i]) - iterate_.axial_force[i]);
     }
   }

@@ -556,7 +556,10 @@ void NewtonSolver::predict(const State &start, const Step &step) {
       for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) increment_[e.edge_row[i] + 3] = step.dt * start.twist_rate[i];
     if (rod.closed) std::copy_n(&increment_[rod.first_row], rod.stride + 3, &increment_[rod.first_row + rod.rows]);
   }
-  if (!potential_->tryMove(increment_, 1, trial_)) return;
+  potential_->retraction.continues = true;
+  const bool possible = potential_->tryMove(increment_, 1, trial_);
+  potential_->retraction.continues = false;
+  if (!possible) return;
   if (potential_->energy(trial_) < potential_->energy(potential_->iterate())) potential_->accept(trial_);
 }
 

@@ -46,7 +46,9 @@ bool Retraction::restoreLengths(const Configuration &from, int r, std::vector<Ve
   for (int i = 0; i < rod.edges; ++i) {
     const int e = rod.first_edge + i;
     const Vec3 edge = x[elements_.vertex1[e]] - x[elements_.vertex0[e]]; // e + scale de
-    target_[i] = from.frame[e].tangent.dot(edge);
+    const Frame &before = from.frame[e];
+    target_[i] = before.tangent.dot(edge);
+    if (continues) target_[i] -= (edge - before.length * before.tangent).squaredNorm() / (2 * before.length);
     const double length = edge.norm();
     if (!(target_[i] > 0) || !(length > 0)) return false;
     direction_[i] = edge / length;

@@ -15,6 +15,8 @@ public:
   Retraction(const Elements &elements, const DofMap &dofs);
 
   RetractionKind kind = RetractionKind::length;
+  /// Increments continue the last step's: an edge then lengthens as it did there, (l^2 - |e - de|^2)/2l, which is not its linearised change t.de.
+  bool continues = false;
   /// Inertia of a step, 1/dt^2 [1/s^2]; weighs the corrections of spans held at both ends.
   void setInverseTimeSquared(double value);
 
