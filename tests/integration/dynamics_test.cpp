@@ -278,7 +278,7 @@ TEST(Newton, ConvergesQuadratically) {
     oneStep(sim, 0.05);
     sim.potential->commit(sim.state);
   }
-  const std::vector<double> r = oneStep(sim, 0.05).history;
+  const std::vector<double> r = oneStep(sim, 0.1).history;
   // The order over the last drop that starts inside the quadratic range and ends above rounding.
   double best = 0;
   for (std::size_t k = 2; k < r.size(); ++k)

@@ -268,5 +268,51 @@ TEST(ArcLength, RefusesPrescribedMotionsAndScenesWithoutLoad) {
   EXPECT_THROW(requireDeadLoads(scene), SceneError);
 }
 
+/// A free ring of a naturally straight round rod with `turns` turns of twist: is the plane circle unstable? The polygon is in equilibrium by
+/// symmetry. A little mass (a step far longer than any period) lifts the seven motions that cost nothing above zero.
+bool ringIsUnstable(int edges, int turns, double torsional) {
+  Rod rod = inextensibleRod(ringShape(Vec3::Zero(), Vec3::UnitZ(), 0.5 / (edges * std::sin(pi / edges)), edges).points, Measure::angle);
+  rod.closed = true;
+  rod.natural = Rod::Natural::given; // straight
+  rod.initial_turns = turns;
+  rod.material.axial_stiffness = 1e7;
+  rod.material.torsional_stiffness = torsional;
+  rod.material.linear_rotational_inertia = 1;
+  setBishopDirectors(rod);
+  Scene scene;
+  scene.gravity = Vec3::Zero();
+  scene.rods = {rod};
+  Simulation sim;
+  const LoopSettings settings = dynamics(100, 100); // unit stiffness, mass and length: periods are below one
+  EXPECT_EQ(sim.setUp(scene, settings), 0);
+  sim.solver.seek_minimum = false; // plain Newton keeps the symmetry; it only has to compress the edges a little (S = -B kappa^2)
+  NewtonReport report;
+  EXPECT_EQ(sim.solver.solve(sim.state, TimeLoop::stepOf(settings, sim.state, 100), &report), 0);
+  EXPECT_TRUE(report.converged) << report.reason;
+  int negative = 0;
+  EXPECT_EQ(sim.solver.inertiaAtIterate(&negative), 0);
+  return negative != 0;
+}
+
+/// Michell's ring: unstable beyond a total twist of 2 pi sqrt(3) B/C. The twist of a closed ring comes in whole turns, so C is what is varied.
+TEST(MichellRing, CriticalTwistIsSecondOrder) {
+  for (const int turns : {1, 2, 3}) {
+    std::vector<double> error;
+    for (const int edges : {16, 32, 64}) {
+      const double exact = std::sqrt(3.0) / turns; // C/B
+      double low = 0.5 * exact, high = 2 * exact;
+      ASSERT_FALSE(ringIsUnstable(edges, turns, low));
+      ASSERT_TRUE(ringIsUnstable(edges, turns, high));
+      while (high - low > 1e-7 * exact) {
+        const double middle = 0.5 * (low + high);
+        (ringIsUnstable(edges, turns, middle) ? high : low) = middle;
+      }
+      error.push_back(std::abs(low / exact - 1));
+    }
+    EXPECT_LT(error[2], 5e-3); // 0.5 % at 64 edges
+    EXPECT_NEAR(order(error[1], error[2]), 2.0, 0.1);
+  }
+}
+
 } // namespace
 } // namespace tendril::test
