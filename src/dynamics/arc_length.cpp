@@ -16,28 +16,22 @@ void requireDeadLoads(const Scene &scene) {
     throw SceneError("-continuation arclength needs a load to follow: gravity, a force, a torque or a moment");
 }
 
-ArcLength::ArcLength(NewtonSolver &solver, const LoopSettings &settings) : solver_(solver), settings_(settings) {
+ArcLength::ArcLength(NewtonSolver &solver, const LoopSettings &settings)
+    : solver_(solver), settings_(settings), metric_(solver.potential().dofs().makePlanes()), load_derivatives_(solver.potential().dofs()) {
   const IncrementalPotential &potential = solver.potential();
   const Elements &e = potential.elements();
   load_ = makeLoad(potential.scene(), e);
-  const std::size_t rows = solver.potential().dofs().rows();
-  load_rows_.gradient.resize(rows);
-  load_rows_.equilibrium.resize(rows);
-  load_rows_.band.resize(rows * DofMap::band);
-  metric_.assign(rows, 0.0);
   for (const RodRange &rod : e.rods) {
     double length = 0;
-    for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) length += e.rest_length[i];
-    for (int v = rod.first_vertex; v < rod.first_vertex + rod.vertices; ++v)
-      for (int a = 0; a < 3; ++a) metric_[e.vertex_row[v] + a] = 1 / (length * length * double(e.vertex_row.size()));
-    if (rod.stride == 4)
-      for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) metric_[e.edge_row[i] + 3] = 1 / double(e.edge_row.size());
+    for (int s = rod.first_slot; s < rod.edgeEnd(); ++s) length += e.restLength()[s];
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) metric_.setVector(0, s, Vec3::Constant(1 / (length * length * e.vertices())));
+    if (rod.twist) std::fill(metric_[3] + rod.first_slot, metric_[3] + rod.edgeEnd(), 1.0 / e.edges());
   }
 }
 
 double ArcLength::product(const Point &a, const Point &b) const {
   double sum = a.factor * b.factor;
-  for (std::size_t k = 0; k < metric_.size(); ++k) sum += metric_[k] * a.rows[k] * b.rows[k];
+  for (std::size_t k = 0; k < metric_.size(); ++k) sum += metric_.data()[k] * a.unknowns.data()[k] * b.unknowns.data()[k];
   return sum;
 }
 
@@ -59,29 +53,25 @@ PetscErrorCode ArcLength::findStart(State &state) {
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode ArcLength::solveRows(const std::vector<double> &right, std::vector<double> *solution) {
-  KSP ksp;
-  OwnedVec b, x;
+/// Change of the equilibrium by unit load factor, K y = -d(gradient)/d(factor), with the Hessian factored last.
+PetscErrorCode ArcLength::solveLoad(Planes *response) {
   PetscFunctionBeginUser;
-  const DofMap &dofs = solver_.potential().dofs();
-  PetscCall(SNESGetKSP(solver_.snes(), &ksp));
-  PetscCall(DMCreateGlobalVector(dofs.dm(), b.out()));
-  PetscCall(VecDuplicate(b, x.out()));
-  PetscCall(dofs.gather(right, b));
-  PetscCall(KSPSolve(ksp, b, x));
-  solution->assign(metric_.size(), 0.0);
-  PetscCall(dofs.scatter(x, *solution));
+  const IncrementalPotential &potential = solver_.potential();
+  load_derivatives_.equilibrium.clear();
+  for (int r = 0; r < potential.rods(); ++r) {
+    load_->addDerivatives(potential.iterate(), r, load_derivatives_);
+    potential.dofs().fold(potential.elements().rods[r], load_derivatives_.equilibrium);
+  }
+  PetscCall(solve(load_derivatives_.equilibrium, response));
   PetscFunctionReturn(0);
 }
 
-/// Change of the equilibrium by unit load factor, K y = -d(gradient)/d(factor), with the Hessian factored last.
-PetscErrorCode ArcLength::solveLoad(std::vector<double> *response) {
+/// Newton's step for a gradient.
+PetscErrorCode ArcLength::solve(const Planes &gradient, Planes *step) {
   PetscFunctionBeginUser;
-  const IncrementalPotential &potential = solver_.potential();
-  std::fill(load_rows_.gradient.begin(), load_rows_.gradient.end(), 0.0);
-  for (std::size_t r = 0; r < potential.elements().rods.size(); ++r) load_->addDerivatives(potential.iterate(), int(r), load_rows_);
-  PetscCall(solveRows(load_rows_.gradient, response));
-  for (double &y : *response) y = -y;
+  if (step->size() == 0) *step = solver_.potential().dofs().makePlanes();
+  PetscCall(solver_.solveLinear(gradient, *step));
+  for (double &y : *step) y = -y;
   PetscFunctionReturn(0);
 }
 
@@ -91,15 +81,15 @@ PetscErrorCode ArcLength::tangent(Point *direction) {
   PetscCall(solver_.inertiaAtIterate(&negative_));
   if (negative_ < 0) obstacle_ = "the Hessian cannot be factored";
   direction->factor = 1;
-  PetscCall(solveLoad(&direction->rows));
-  const double side = last_.rows.empty() ? 1 : product(*direction, last_), norm = std::sqrt(product(*direction, *direction));
+  PetscCall(solveLoad(&direction->unknowns));
+  const double side = last_.unknowns.size() == 0 ? 1 : product(*direction, last_), norm = std::sqrt(product(*direction, *direction));
   const double scale = (side < 0 ? -1 : 1) / norm;
-  for (double &d : direction->rows) d *= scale;
+  for (double &d : direction->unknowns) d *= scale;
   direction->factor *= scale;
   PetscFunctionReturn(0);
 }
 
-bool ArcLength::move(const std::vector<double> &increment, double factor) {
+bool ArcLength::move(const Planes &increment, double factor) {
   IncrementalPotential &potential = solver_.potential();
   if (!std::isfinite(factor) || !potential.tryMove(increment, 1.0, trial_)) return false;
   potential.accept(trial_);
@@ -134,15 +124,14 @@ PetscErrorCode ArcLength::iterate(const std::function<double(const Point &moved,
     }
     Point moved, correction, load;
     load.factor = 1;
-    potential.coordinates(moved.rows);
+    potential.coordinates(moved.unknowns);
     moved.factor = potential.step().load_factor - start;
-    PetscCall(solveRows(potential.derivatives().gradient, &correction.rows));
-    for (double &d : correction.rows) d = -d;
-    PetscCall(solveLoad(&load.rows));
+    PetscCall(solve(potential.derivatives().gradient, &correction.unknowns));
+    PetscCall(solveLoad(&load.unknowns));
     const double change = constraint(moved, correction, load);
-    for (std::size_t r = 0; r < correction.rows.size(); ++r) correction.rows[r] += change * load.rows[r];
+    for (std::size_t k = 0; k < metric_.size(); ++k) correction.unknowns.data()[k] += change * load.unknowns.data()[k];
     ++iterations_;
-    if (!move(correction.rows, potential.step().load_factor + change)) {
+    if (!move(correction.unknowns, potential.step().load_factor + change)) {
       obstacle_ = "an edge vanishes or turns back on itself";
       PetscFunctionReturn(0);
     }
@@ -184,8 +173,8 @@ PetscErrorCode ArcLength::step(const State &state, double length, bool *converge
   PetscCall(tangent(&direction));
   if (!obstacle_.empty()) PetscFunctionReturn(0);
   Point predicted = direction;
-  for (double &d : predicted.rows) d *= length;
-  if (!move(predicted.rows, state.time + length * direction.factor)) {
+  for (double &d : predicted.unknowns) d *= length;
+  if (!move(predicted.unknowns, state.time + length * direction.factor)) {
     obstacle_ = "an edge vanishes or turns back on itself";
     PetscFunctionReturn(0);
   }
@@ -193,7 +182,7 @@ PetscErrorCode ArcLength::step(const State &state, double length, bool *converge
   if (*converged && potential.step().load_factor > settings_.t_end) PetscCall(correctAt(settings_.t_end, converged));
   if (!*converged) PetscFunctionReturn(0);
   Point moved;
-  potential.coordinates(moved.rows);
+  potential.coordinates(moved.unknowns);
   moved.factor = potential.step().load_factor - state.time;
   *converged = product(moved, moved) < straying * straying * length * length;
   if (*converged)

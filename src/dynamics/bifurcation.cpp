@@ -29,14 +29,13 @@ PetscErrorCode locateCritical(NewtonSolver &solver, const State &stable, const S
   std::optional<State> high;
   double low_factor = stable.time, high_factor = step.time;
   *found = false;
-  solver.seek_minimum = false;
   // A solve that fails counts as beyond: past a limit point there is nothing near to converge to.
   for (int solves = 0; solves < most_solves && high_factor - low_factor > interval * std::abs(high_factor); ++solves) {
     Step middle = step;
     middle.time = 0.5 * (low_factor + high_factor);
     middle.load_factor = middle.time;
     NewtonReport report;
-    PetscCall(solver.solve(low, middle, &report));
+    PetscCall(solver.solve(low, middle, &report, Seek::equilibrium));
     State state = low;
     if (report.converged) solver.potential().commit(state);
     if (report.converged && report.negative_pivots == 0) {
@@ -49,7 +48,6 @@ PetscErrorCode locateCritical(NewtonSolver &solver, const State &stable, const S
       if (report.converged) high = state;
     }
   }
-  solver.seek_minimum = true;
   point->load_factor = low_factor;
   point->limit = high_factor < step.time && (!high || distance(low, *high) > near);
   point->state = low;

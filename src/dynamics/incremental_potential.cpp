@@ -3,7 +3,7 @@
 #include "tendril/energy/edge.hpp"
 
 #include <algorithm>
-#include <limits>
+#include <utility>
 
 namespace tendril {
 namespace {
@@ -27,30 +27,47 @@ std::vector<double> loads(const Scene &scene, const std::vector<double> &length)
 
 } // namespace
 
+using C = Configuration;
+
 IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, const Elements &elements, bool dynamic)
-    : retraction(elements, dofs), scene_(scene), dofs_(dofs), elements_(elements), terms_(makeTerms(scene, elements, axial_, dynamic)) {
-  rows_.gradient.resize(dofs.rows());
-  rows_.equilibrium.resize(dofs.rows());
-  rows_.band.resize(std::size_t(dofs.rows()) * DofMap::band);
-  for (const RodRange &rod : elements.rods) {
-    double sum = 0;
-    for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) sum += elements.rest_length[i];
+    : scene_(scene), dofs_(dofs), elements_(elements), retraction_(elements, dofs), axial_(scene, elements), terms_(makeTerms(scene, elements, axial_, dynamic)),
+      start_(elements.slots), derivatives_(dofs), current_(elements.rods.size(), false) {
+  for (std::size_t r = 0; r < elements.rods.size(); ++r) {
+    const RodRange &rod = elements.rods[r];
+    double sum = 0, shortest = HUGE_VAL, bending = 0, cell = HUGE_VAL;
+    for (int s = rod.first_slot; s < rod.edgeEnd(); ++s) {
+      sum += elements.restLength()[s];
+      shortest = std::min(shortest, elements.restLength()[s]);
+    }
+    for (int n = elements.rod_cells[r]; n < elements.rod_cells[r + 1]; ++n) {
+      cell = std::min(cell, elements.cellLength()[elements.cell_slot[n]]);
+      for (int k = 0; k < 3; ++k) bending += elements.cells()[cell_stiffness + k][elements.cell_slot[n]];
+    }
     length_.push_back(sum);
+    shortest_.push_back(shortest);
+    bending_.push_back(bending);
+    shortest_cell_.push_back(cell);
   }
   load_ = loads(scene, length_);
 }
 
 void IncrementalPotential::beginStep(const State &start, const Step &step) {
-  start_ = start;
+  start_state_ = start;
   step_ = step;
-  iterate_ = configurationOf(start, scene_, elements_, start.time);
-  axial_.beginStep(scene_, elements_, iterate_, step_);
-  start_frame_.assign(iterate_.frame.begin(), iterate_.frame.begin() + dofs_.edges());
-  for (auto &term : terms_) term->beginStep(start_, iterate_, step_);
+  setConfiguration(start, scene_, elements_, start.time, start_);
+  iterate_ = start_;
+  axial_.beginStep(start_, step_);
+  for (auto &term : terms_) term->beginStep(start_state_, start_, step_);
   turnSupports();
   setForceScales();
-  retraction.setInverseTimeSquared(step.isStatic() ? 0 : 1 / (step.dt * step.dt));
-  current_ = false;
+  retraction_.setInverseTimeSquared(step.isStatic() ? 0 : 1 / (step.dt * step.dt));
+  std::fill(current_.begin(), current_.end(), false);
+}
+
+void IncrementalPotential::setLoadFactor(double factor) {
+  step_.load_factor = step_.time = factor;
+  for (auto &term : terms_) term->setLoadFactor(factor);
+  std::fill(current_.begin(), current_.end(), false);
 }
 
 /// The force that measures each rod's residual: its loads. A rod without any is measured by the force that deforms it,
@@ -68,7 +85,7 @@ void IncrementalPotential::setForceScales() {
     force_scale_[r] = softest / (length_[r] * length_[r]);
     if (step_.isStatic()) continue;
     double momentum = 0;
-    for (int v = rod.first_vertex; v < rod.first_vertex + rod.vertices; ++v) momentum += elements_.mass[v] * start_.velocity[v].norm();
+    for (int i = 0; i < rod.vertices; ++i) momentum += elements_.mass()[rod.slot(i)] * start_state_.velocity[rod.first_vertex + i].norm();
     if (momentum > 0) force_scale_[r] = std::min(force_scale_[r], momentum / step_.dt);
   }
 }
@@ -76,69 +93,65 @@ void IncrementalPotential::setForceScales() {
 /// Supports' frames to the end of the step; whole turns of the twist angles follow.
 void IncrementalPotential::turnSupports() {
   beyond_barrier_ = false;
-  std::vector<double> turned(elements_.frames - dofs_.edges(), 0.0);
-  bool any = false;
+  std::vector<std::pair<int, double>> turned; // slot of the frame, angle
   for (std::size_t s = 0; s < scene_.supports.size(); ++s) {
-    const int frame = elements_.support_frame[s];
-    if (frame < 0 || !scene_.supports[s].motion.moves()) continue;
+    const int slot = elements_.support_slot[s];
     const Motion &motion = scene_.supports[s].motion;
+    if (slot < 0 || !motion.moves()) continue;
+    turned.emplace_back(slot, 0.0);
     // In parts of less than half a radian, so that whole turns within the step are counted.
-    const int parts = 1 + int(2 * (motion.rotationVectorAt(step_.time) - motion.rotationVectorAt(start_.time)).norm());
+    const int parts = 1 + int(2 * (motion.rotationVectorAt(step_.time) - motion.rotationVectorAt(start_state_.time)).norm());
     for (int k = 1; k <= parts; ++k) {
-      const double time = k == parts ? step_.time : start_.time + (step_.time - start_.time) * k / parts;
+      const double time = k == parts ? step_.time : start_state_.time + (step_.time - start_state_.time) * k / parts;
       const Frame now = supportFrame(scene_.supports[s], time);
-      turned[frame - dofs_.edges()] += halfAngleBetween(iterate_.frame[frame], now).angle();
-      iterate_.frame[frame] = now;
+      turned.back().second += halfAngleBetween(iterate_.frameAt(slot), now).angle();
+      iterate_.setFrame(slot, now);
     }
-    any = true;
   }
-  if (!any) return;
-  const CellArrays &cells = elements_.cells;
-  auto turning = [&](int frame) { return frame < dofs_.edges() ? 0.0 : turned[frame - dofs_.edges()]; };
-  for (int c = 0; c < cells.size(); ++c) {
-    const double expected = iterate_.twist[c] + turning(cells.frame1[c]) - turning(cells.frame0[c]);
-    const double principal = halfAngleBetween(iterate_.frame[cells.frame0[c]], iterate_.frame[cells.frame1[c]]).angle();
-    iterate_.turns[c] = 2 * pi * std::round((expected - principal) / (2 * pi));
-    iterate_.twist[c] = principal + iterate_.turns[c];
-  }
-  for (std::size_t r = 0; r < elements_.rods.size(); ++r)
-    if (elements_.measure[r] == Measure::tan)
-      for (int c = elements_.rod_cells[r]; c < elements_.rod_cells[r + 1]; ++c) beyond_barrier_ = beyond_barrier_ || iterate_.turns[c] != 0;
+  if (turned.empty()) return;
+  auto turning = [&](int frame) {
+    for (const auto &[slot, angle] : turned)
+      if (slot == frame) return angle;
+    return 0.0;
+  };
+  for (int r = 0; r < rods(); ++r)
+    forCells(elements_, r, [&]<class T>(const LooseCell &cells, int count) {
+      for (int l = 0; l < count; ++l) {
+        const LooseCell cell{cells.slot + l, cells.frame0 + l, cells.frame1 + l, cells.vertex + l};
+        double &twist = iterate_[C::twist][cell.slot], &turns = iterate_[C::turns][cell.slot];
+        const double expected = twist + turning(cell.frame1) - turning(cell.frame0);
+        const double principal = halfAngleBetween(iterate_.frameAt(cell.frame0), iterate_.frameAt(cell.frame1)).angle();
+        turns = 2 * pi * std::round((expected - principal) / (2 * pi));
+        twist = principal + turns;
+        beyond_barrier_ = beyond_barrier_ || (elements_.measure[r] == Measure::tan && turns != 0);
+      }
+    });
 }
 
-bool IncrementalPotential::remainingMotion(std::vector<double> &increment) const {
-  increment.assign(dofs_.rows(), 0.0);
+bool IncrementalPotential::remainingMotion(Planes &increment) const {
+  if (increment.size() == 0) increment = dofs_.makePlanes();
+  increment.clear();
   bool any = false;
   for (const Support &s : scene_.supports) {
     if (!s.holdsPosition() || !s.motion.moves()) continue;
-    const RodRange &rod = elements_.rods[s.rod];
-    const int v = rod.first_vertex + s.vertex;
+    const int slot = elements_.rods[s.rod].slot(s.vertex);
     const Vec3 target = scene_.rods[s.rod].position[s.vertex] + s.motion.displacementAt(step_.time);
-    const Vec3 d = target - iterate_.position[v];
+    const Vec3 d = target - iterate_.positionAt(slot);
     if (d.norm() <= 4 * epsilon * target.norm()) continue;
     any = true;
-    for (int a = 0; a < 3; ++a) increment[elements_.vertex_row[v] + a] = d[a];
-    if (rod.closed && s.vertex <= 1)
-      for (int a = 0; a < 3; ++a) increment[rod.first_row + rod.rows + rod.stride * s.vertex + a] = d[a];
+    increment.setVector(0, slot, d);
   }
+  if (any) dofs_.copyBehindRings(increment);
   return any;
 }
 
-void IncrementalPotential::energies(const Configuration &configuration, std::vector<double> &energy) const {
-  energy.resize(elements_.rods.size());
-  for (std::size_t r = 0; r < elements_.rods.size(); ++r) {
-    double sum = 0;
-    for (const auto &term : terms_) sum += term->energy(configuration, int(r));
-    energy[r] = std::isfinite(sum) ? sum : std::numeric_limits<double>::infinity();
-  }
-}
-
-double IncrementalPotential::energy(const Configuration &configuration) const {
-  std::vector<double> energy;
-  energies(configuration, energy);
-  double sum = 0;
-  for (const double e : energy) sum += e;
-  return sum;
+/// Largest coordinate of a rod's vertices [m].
+double IncrementalPotential::reachOf(const Configuration &c, const RodRange &rod) const {
+  using std::abs;
+  Pack reach(0.0);
+  for (int a = 0; a < 3; ++a)
+    for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) reach = max(reach, abs(read<Pack>(c[C::Plane(C::position + a)] + s)));
+  return hmax(reach);
 }
 
 /// How much stiffer than at rest the steepest cell of a rod is: near 180 degrees of fold or twist the measure `tan` grows without bound, with the
@@ -146,186 +159,209 @@ double IncrementalPotential::energy(const Configuration &configuration) const {
 double IncrementalPotential::steepnessOf(const Configuration &c, int r) const {
   if (elements_.measure[r] != Measure::tan) return 1;
   double flattest = 1;
-  for (int n = elements_.rod_cells[r]; n < elements_.rod_cells[r + 1]; ++n) {
-    const double turning = 0.5 * (1 + c.frame[elements_.cells.frame0[n]].tangent.dot(c.frame[elements_.cells.frame1[n]].tangent)); // cos^2 of half
-    flattest = std::min({flattest, turning, 0.5 * (1 + std::cos(c.twist[n]))});
-  }
+  forCells(elements_, r, [&]<class T>(const LooseCell &cell, int count) {
+    const auto [f0, f1] = cellFrames<T>(c, cell, count);
+    const T turning = T(0.5) * (T(1.0) + f0.tangent.dot(f1.tangent)); // cos^2 of half
+    T twist = cosine(T(read<T>(c[C::twist] + cell.slot)));
+    if constexpr (std::is_same_v<T, Pack>) {
+      twist = select(firstLanes(count), twist, Pack(1.0));
+      flattest = std::min(flattest, hmin(min(turning, T(Pack(0.5) * (Pack(1.0) + twist)))));
+    } else
+      flattest = std::min({flattest, turning, 0.5 * (1 + twist)});
+  });
   return 1 / std::max(flattest * flattest, epsilon);
 }
 
 /// Coordinates carry an error of epsilon x reach, which is a strain of delta = epsilon reach / h in an edge of length h and an angle as large in
 /// a cell: each costs (force + stiffness delta) delta of energy. On top of it comes the rounding of the sums.
-double IncrementalPotential::energyNoise(const Configuration &configuration) const {
-  double noise = 0;
-  for (std::size_t r = 0; r < elements_.rods.size(); ++r) {
-    const RodRange &rod = elements_.rods[r];
-    double reach = 0;
-    for (int v = rod.first_vertex; v < rod.first_vertex + rod.vertices; ++v) reach = std::max(reach, configuration.position[v].cwiseAbs().maxCoeff());
-    for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
-      const double delta = epsilon * reach * elements_.inverse_rest_length[i];
-      const double force = axial_.stiffness[i] * std::abs(configuration.strain[i] - axial_.rest[i]);
-      noise += (force + axial_.stiffness[i] * delta) * delta * elements_.rest_length[i];
-    }
-    double bending = 0, delta = 0;
-    const double steepness = steepnessOf(configuration, int(r));
-    for (int c = elements_.rod_cells[r]; c < elements_.rod_cells[r + 1]; ++c) {
-      delta = std::max(delta, 4 * epsilon * reach / elements_.cells.length[c]); // edge, length, tangent and binormal each round
-      bending += elements_.cells.stiffness[0][c] + elements_.cells.stiffness[1][c] + elements_.cells.stiffness[2][c];
-    }
-    for (const auto &term : terms_) {
-      const double energy = std::abs(term->energy(configuration, int(r)));
-      noise += 64 * epsilon * energy + delta * (std::sqrt(2 * energy * bending * steepness) + bending * steepness * delta);
-    }
+IncrementalPotential::RodEnergy IncrementalPotential::rodEnergy(const Configuration &c, int r) const {
+  using std::abs;
+  const RodRange &rod = elements_.rods[r];
+  const double blur = epsilon * reachOf(c, rod);
+  Pack stretching(0.0);
+  for (int i = rod.first_slot; i < rod.edgeEnd(); i += lanes) {
+    const Pack stiffness = read<Pack>(axial_.stiffness() + i), delta = Pack(blur) * read<Pack>(elements_.inverseRestLength() + i);
+    const Pack force = stiffness * abs(read<Pack>(c[C::strain] + i) - read<Pack>(axial_.rest() + i));
+    stretching += (force + stiffness * delta) * Pack(blur);
   }
-  return noise;
+  // Edge, length, tangent and binormal each round.
+  const double delta = 4 * blur / shortest_cell_[r], bending = bending_[r] * steepnessOf(c, r);
+  RodEnergy result{0, reduce(stretching)};
+  for (const auto &term : terms_) {
+    const double energy = term->energy(c, r);
+    result.value += energy;
+    result.noise += 64 * epsilon * std::abs(energy) + delta * (std::sqrt(2 * std::abs(energy) * bending) + bending * delta);
+  }
+  if (!std::isfinite(result.value)) result = {};
+  return result;
 }
 
-const Rows &IncrementalPotential::derivatives() {
-  if (current_) return rows_;
-  std::fill(rows_.gradient.begin(), rows_.gradient.end(), 0.0);
-  std::fill(rows_.band.begin(), rows_.band.end(), 0.0);
-  // Stretch is the first term and adds to both residuals; what the others add is the same for both.
-  std::fill(rows_.equilibrium.begin(), rows_.equilibrium.end(), 0.0);
-  for (std::size_t r = 0; r < elements_.rods.size(); ++r) terms_[0]->addDerivatives(iterate_, int(r), rows_, step_.hessian);
-  for (std::size_t k = 0; k < rows_.gradient.size(); ++k) rows_.equilibrium[k] -= rows_.gradient[k];
-  for (std::size_t t = 1; t < terms_.size(); ++t)
-    for (std::size_t r = 0; r < elements_.rods.size(); ++r) terms_[t]->addDerivatives(iterate_, int(r), rows_, step_.hessian);
-  for (std::size_t k = 0; k < rows_.gradient.size(); ++k) rows_.equilibrium[k] += rows_.gradient[k];
-  current_ = true;
-  return rows_;
+double IncrementalPotential::energy(const Configuration &configuration) const {
+  double sum = 0;
+  for (int r = 0; r < rods(); ++r) sum += rodEnergy(configuration, r).value;
+  return sum;
 }
 
-const std::vector<double> &IncrementalPotential::bandWithoutCompression() {
-  uncompressed_.gradient.assign(rows_.gradient.size(), 0.0);
-  uncompressed_.equilibrium.assign(rows_.gradient.size(), 0.0);
-  uncompressed_.band.assign(rows_.band.size(), 0.0);
-  for (const auto &term : terms_)
-    for (std::size_t r = 0; r < elements_.rods.size(); ++r) term->addDerivatives(iterate_, int(r), uncompressed_, step_.hessian == HessianKind::exact ? HessianKind::uncompressed : step_.hessian);
-  return uncompressed_.band;
+void IncrementalPotential::assembleRod(int r, HessianKind hessian) {
+  const RodRange &rod = elements_.rods[r];
+  Derivatives &d = derivatives_;
+  for (int a = 0; a < slot_size; ++a)
+    for (Planes *p : {&d.gradient, &d.equilibrium}) std::fill((*p)[a] + rod.first_slot - 1, (*p)[a] + rod.first_slot + rod.slots - 1, 0.0);
+  d.band.clear(rod);
+  for (const auto &term : terms_) term->addDerivatives(iterate_, r, d, hessian);
+  for (int a = 0; a < slot_size; ++a)
+    for (int s = rod.first_slot; s < rod.vertexEnd() + 2; s += lanes) addTo(d.gradient[a] + s, read<Pack>(d.equilibrium[a] + s));
+  dofs_.fold(rod, d.gradient);
+  dofs_.fold(rod, d.equilibrium);
+  dofs_.fold(rod, d.band);
+  current_[r] = true;
+}
+
+const Derivatives &IncrementalPotential::derivatives() {
+  for (int r = 0; r < rods(); ++r)
+    if (!current_[r]) assembleRod(r, step_.hessian);
+  return derivatives_;
 }
 
 void IncrementalPotential::resetAxialForces() {
-  for (std::size_t i = 0; i < iterate_.axial_force.size(); ++i) iterate_.axial_force[i] = axial_.stiffness[i] * (iterate_.strain[i] - axial_.rest[i]);
-  current_ = false;
+  for (const RodRange &rod : elements_.rods)
+    for (int i = rod.first_slot; i < rod.edgeEnd(); ++i) iterate_[C::axial_force][i] = axial_.stiffness()[i] * (iterate_[C::strain][i] - axial_.rest()[i]);
+  std::fill(current_.begin(), current_.end(), false);
 }
 
-bool IncrementalPotential::tryMove(const std::vector<double> &increment, double scale, Configuration &trial) {
-  trial.position.resize(iterate_.position.size());
-  trial.frame = iterate_.frame;
-  trial.strain.resize(iterate_.strain.size());
-  trial.spin.resize(iterate_.spin.size());
-  trial.turns = iterate_.turns;
-  trial.twist = iterate_.twist;
-  trial.axial_force.resize(iterate_.axial_force.size());
-  for (std::size_t r = 0; r < elements_.rods.size(); ++r) {
-    if (!retraction.apply(iterate_, increment, scale, int(r), trial)) return false;
-    const RodRange &rod = elements_.rods[r];
-    for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
-      const Frame &f = iterate_.frame[i];
-      const double inverse = elements_.inverse_rest_length[i];
-      if (!step_.mixed) {
-        trial.axial_force[i] = axial_.stiffness[i] * (trial.strain[i] - axial_.rest[i]);
-        continue;
-      }
-      // dS = k (B d + c): the force the linearised strain asks for.
-      const int row = elements_.edge_row[i];
-      const Vec3 de = Eigen::Map<const Vec3>(&increment[row + rod.stride]) - Eigen::Map<const Vec3>(&increment[row]);
-      const double change = f.length * f.tangent.dot(de) - (retraction.continues ? 0.5 * de.squaredNorm() : 0.0);
-      const double strain = iterate_.strain[i] + change * inverse * inverse;
-      trial.axial_force[i] = iterate_.axial_force[i] + scale * (axial_.stiffness[i] * (strain - axial_.rest[i]) - iterate_.axial_force[i]);
+bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r, RetractionKind kind, Configuration &trial) {
+  if (trial.empty()) trial = iterate_;
+  trial.copyEnds(elements_, r, iterate_);
+  if (!retraction_.apply(iterate_, increment, scale, r, kind, trial)) return false;
+  const RodRange &rod = elements_.rods[r];
+  for (int i = rod.first_slot; i < rod.edgeEnd(); i += lanes) {
+    const Pack stiffness = read<Pack>(axial_.stiffness() + i), rest = read<Pack>(axial_.rest() + i);
+    if (!step_.mixed) {
+      write(trial[C::axial_force] + i, Pack(stiffness * (read<Pack>(trial[C::strain] + i) - rest)));
+      continue;
     }
+    // dS = k (B d + c): the force the linearised strain asks for.
+    const Pack inverse = read<Pack>(elements_.inverseRestLength() + i), force = read<Pack>(iterate_[C::axial_force] + i);
+    const Vector3<Pack> de = readVector<Pack>(increment, 0, i + 1) - readVector<Pack>(increment, 0, i), t = readVector<Pack>(iterate_.values(), C::tangent, i);
+    Pack change = read<Pack>(iterate_[C::length] + i) * t.dot(de);
+    if (kind == RetractionKind::continued) change -= Pack(0.5) * de.squaredNorm();
+    const Pack strain = read<Pack>(iterate_[C::strain] + i) + change * inverse * inverse;
+    write(trial[C::axial_force] + i, Pack(force + Pack(scale) * (stiffness * (strain - rest) - force)));
   }
   return true;
 }
 
-void IncrementalPotential::accept(Configuration &trial) {
-  std::swap(iterate_, trial);
-  for (auto &term : terms_) term->moveIterate(iterate_);
-  current_ = false;
+bool IncrementalPotential::tryMove(const Planes &increment, double scale, Configuration &trial) {
+  for (int r = 0; r < rods(); ++r)
+    if (!tryMove(increment, scale, r, trial)) return false;
+  return true;
 }
 
-void IncrementalPotential::coordinates(std::vector<double> &x) const {
-  x.assign(dofs_.rows(), 0.0);
-  for (const RodRange &rod : elements_.rods)
-    for (int v = 0; v < rod.vertices; ++v) {
-      const int row = dofs_.vertexRow(rod, v);
-      const Vec3 d = iterate_.position[rod.first_vertex + v] - start_.position[rod.first_vertex + v];
-      for (int a = 0; a < 3; ++a) x[row + a] = d[a];
-      if (rod.stride == 4 && v < rod.edges) x[row + 3] = iterate_.spin[rod.first_edge + v];
+void IncrementalPotential::accept(const Configuration &trial, int r) {
+  iterate_.copyRod(elements_, r, trial);
+  for (auto &term : terms_) term->moveIterate(iterate_, r);
+  current_[r] = false;
+}
+
+void IncrementalPotential::accept(const Configuration &trial) {
+  for (int r = 0; r < rods(); ++r) accept(trial, r);
+}
+
+void IncrementalPotential::coordinates(Planes &x) const {
+  if (x.size() == 0) x = dofs_.makePlanes();
+  for (const RodRange &rod : elements_.rods) {
+    for (int a = 0; a < 3; ++a) {
+      const double *now = iterate_[C::Plane(C::position + a)], *before = start_[C::Plane(C::position + a)];
+      for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) x[a][s] = now[s] - before[s];
     }
+    if (rod.twist) std::copy(iterate_[C::spin] + rod.first_slot, iterate_[C::spin] + rod.edgeEnd(), x[3] + rod.first_slot);
+  }
 }
 
-void IncrementalPotential::moveTo(const std::vector<double> &x) {
-  std::vector<double> increment;
-  coordinates(increment);
-  const auto &unknown = dofs_.unknownOfRow();
-  for (std::size_t k = 0; k < increment.size(); ++k) increment[k] = unknown[k] >= 0 ? x[k] - increment[k] : 0.0;
+void IncrementalPotential::moveTo(const Planes &x) {
+  Planes increment, now;
+  coordinates(now);
+  increment = now;
+  bool moves = false;
   for (const RodRange &rod : elements_.rods)
-    if (rod.closed) std::copy_n(&increment[rod.first_row], rod.stride + 3, &increment[rod.first_row + rod.rows]);
-  if (std::all_of(increment.begin(), increment.end(), [](double v) { return v == 0; })) return;
-  const RetractionKind kind = std::exchange(retraction.kind, RetractionKind::additive);
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
+      for (int a = 0; a < slot_size; ++a) {
+        increment[a][s] = dofs_.unknown(s, a) >= 0 ? x[a][s] - now[a][s] : 0.0;
+        moves = moves || increment[a][s] != 0;
+      }
+  if (!moves) return;
+  dofs_.copyBehindRings(increment);
   Configuration trial;
-  if (tryMove(increment, 1.0, trial)) accept(trial);
-  retraction.kind = kind;
+  for (int r = 0; r < rods(); ++r)
+    if (!tryMove(increment, 1.0, r, RetractionKind::additive, trial)) return;
+  accept(trial);
+}
+
+IncrementalPotential::Residual IncrementalPotential::residual(int r) {
+  using std::abs;
+  const RodRange &rod = elements_.rods[r];
+  const Material &m = scene_.rods[r].material;
+  if (!current_[r]) assembleRod(r, step_.hessian);
+  const Planes &out_of_balance = derivatives_.equilibrium;
+  Pack forces(0.0), moments(0.0), tension(0.0), shortest(shortest_[r]), error(0.0);
+  for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) {
+    forces += read<Pack>(elements_.freedom() + s) * readVector<Pack>(out_of_balance, 0, s).squaredNorm();
+    const Pack g = read<Pack>(out_of_balance[3] + s);
+    moments += g * g;
+  }
+  for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
+    const Pack::mask_type live = firstLanes(rod.edgeEnd() - s);
+    const Pack force = read<Pack>(iterate_[C::axial_force] + s), strain = read<Pack>(iterate_[C::strain] + s) - read<Pack>(axial_.rest() + s);
+    tension = max(tension, select(live, Pack(abs(force)), Pack(0.0)));
+    error = max(error, select(live, Pack(abs(strain - force / read<Pack>(axial_.stiffness() + s))), Pack(0.0)));
+  }
+  const double force = reduce(forces), moment = reduce(moments);
+  // Coordinates carry an error of epsilon x reach: strains of epsilon reach/h, which the stiffnesses turn into forces and moments.
+  const double strain_noise = epsilon * reachOf(iterate_, rod) / shortest_[r], count = std::sqrt(double(rod.vertices));
+  const double bending = steepnessOf(iterate_, r) * std::max({m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness}) / shortest_[r];
+  const double scale = force_scale_[r], stretching = step_.mixed ? hmax(tension) : hmax(tension) + m.axial_stiffness;
+  Residual result;
+  result.force = std::sqrt(force) / scale;
+  result.moment = std::sqrt(moment) / (scale * length_[r]);
+  result.compatibility = step_.mixed ? hmax(error) : 0;
+  result.force_floor = 4 * count * strain_noise * (stretching + (m.isCable() ? 0 : bending / shortest_[r])) / scale;
+  if (!m.isCable()) result.moment_floor = 4 * count * strain_noise * bending / (scale * length_[r]);
+  result.compatibility_floor = 16 * strain_noise;
+  return result;
+}
+
+void IncrementalPotential::Residual::include(const Residual &other) {
+  for (double Residual::*part : {&Residual::force, &Residual::moment, &Residual::compatibility, &Residual::force_floor, &Residual::moment_floor, &Residual::compatibility_floor})
+    if (other.*part > this->*part || std::isnan(other.*part)) this->*part = other.*part;
 }
 
 IncrementalPotential::Residual IncrementalPotential::residual() {
-  const Rows &rows = derivatives();
-  const auto &unknown = dofs_.unknownOfRow();
-  Residual result;
-  for (std::size_t r = 0; r < elements_.rods.size(); ++r) {
-    const RodRange &rod = elements_.rods[r];
-    const Material &m = scene_.rods[r].material;
-    double force = 0, moment = 0, reach = 0, tension = 0, shortest = length_[r];
-    for (int v = 0; v < rod.vertices; ++v) {
-      const int row = dofs_.vertexRow(rod, v);
-      for (int a = 0; a < 3; ++a) {
-        if (unknown[row + a] < 0) continue;
-        double g = rows.equilibrium[row + a];
-        if (rod.closed && v <= 1) g += rows.equilibrium[row + rod.rows + a];
-        force += g * g;
-      }
-      reach = std::max(reach, iterate_.position[rod.first_vertex + v].cwiseAbs().maxCoeff());
-    }
-    for (int i = 0; i < rod.edges; ++i) {
-      const int e = rod.first_edge + i, row = elements_.edge_row[e];
-      if (rod.stride == 4) {
-        double g = rows.equilibrium[row + 3];
-        if (rod.closed && i == 0) g += rows.equilibrium[row + rod.rows + 3];
-        moment += g * g;
-      }
-      tension = std::max(tension, std::abs(iterate_.axial_force[e]));
-      shortest = std::min(shortest, elements_.rest_length[e]);
-      const double strain = iterate_.strain[e] - axial_.rest[e];
-      if (step_.mixed) result.compatibility = std::max(result.compatibility, std::abs(strain - iterate_.axial_force[e] / axial_.stiffness[e]));
-    }
-    // Coordinates carry an error of epsilon x reach: strains of epsilon reach/h, which the stiffnesses turn into forces and moments.
-    const double strain_noise = epsilon * reach / shortest, count = std::sqrt(double(rod.vertices));
-    const double bending = steepnessOf(iterate_, int(r)) * std::max({m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness}) / shortest;
-    const double scale = force_scale_[r], stretching = step_.mixed ? tension : tension + m.axial_stiffness;
-    result.force = std::max(result.force, std::sqrt(force) / scale);
-    result.moment = std::max(result.moment, std::sqrt(moment) / (scale * length_[r]));
-    result.force_floor = std::max(result.force_floor, 4 * count * strain_noise * (stretching + (m.isCable() ? 0 : bending / shortest)) / scale);
-    if (!m.isCable()) result.moment_floor = std::max(result.moment_floor, 4 * count * strain_noise * bending / (scale * length_[r]));
-    result.compatibility_floor = std::max(result.compatibility_floor, 16 * strain_noise);
-  }
-  return result;
+  Residual worst;
+  for (int r = 0; r < rods(); ++r) worst.include(residual(r));
+  return worst;
 }
 
 void IncrementalPotential::commit(State &state) const {
   state.time = step_.time;
   ++state.step;
-  state.position = iterate_.position;
-  state.axial_force = iterate_.axial_force;
-  state.turns = iterate_.turns;
-  for (int i = 0; i < dofs_.edges(); ++i) {
-    state.director[i] = orthonormalised(iterate_.frame[i].director, iterate_.frame[i].tangent);
-    if (step_.isStatic()) continue;
-    const double principal = twistIncrement(start_frame_[i], iterate_.frame[i]);
-    state.twist_rate[i] = (principal + 2 * pi * std::round((iterate_.spin[i] - principal) / (2 * pi))) / step_.dt;
+  for (std::size_t n = 0; n < state.turns.size(); ++n) state.turns[n] = iterate_[C::turns][elements_.cell_slot[n]];
+  for (const RodRange &rod : elements_.rods) {
+    for (int i = 0; i < rod.vertices; ++i) {
+      const int v = rod.first_vertex + i;
+      const Vec3 x = iterate_.positionAt(rod.slot(i));
+      if (!step_.isStatic()) state.velocity[v] = (x - start_.positionAt(rod.slot(i))) / step_.dt;
+      state.position[v] = x;
+    }
+    for (int i = 0; i < rod.edges; ++i) {
+      const int slot = rod.slot(i), e = rod.first_edge + i;
+      const Frame f = iterate_.frameAt(slot);
+      state.axial_force[e] = iterate_[C::axial_force][slot];
+      state.director[e] = orthonormalised(f.director, f.tangent);
+      if (step_.isStatic()) continue;
+      const double principal = twistIncrement(start_.frameAt(slot), f);
+      state.twist_rate[e] = (principal + 2 * pi * std::round((iterate_[C::spin][slot] - principal) / (2 * pi))) / step_.dt;
+    }
   }
-  if (!step_.isStatic())
-    for (std::size_t v = 0; v < state.position.size(); ++v) state.velocity[v] = (iterate_.position[v] - start_.position[v]) / step_.dt;
 }
 
 } // namespace tendril

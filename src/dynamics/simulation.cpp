@@ -8,7 +8,7 @@ PetscErrorCode Simulation::setUp(Scene scene_to_run, const LoopSettings &setting
   PetscCall(dofs.setUp(scene));
   elements = std::make_unique<Elements>(scene, dofs);
   potential = std::make_unique<IncrementalPotential>(scene, dofs, *elements, settings.dynamic);
-  potential->retraction.kind = settings.retraction;
+  potential->retraction = settings.retraction;
   PetscCall(solver.setUp(*potential));
   state = initialState(scene, *elements);
   PetscFunctionReturn(0);

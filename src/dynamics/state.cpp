@@ -4,6 +4,42 @@
 
 namespace tendril {
 
+Configuration::Configuration(int slots) : values_(planes, slots) {
+  for (const int plane : {int(tangent), director + 1, int(length)}) std::fill_n(values_[plane], slots, 1.0);
+}
+
+void Configuration::setFrame(int slot, const Frame &f) {
+  values_.setVector(tangent, slot, f.tangent);
+  values_.setVector(director, slot, f.director);
+  values_[length][slot] = f.length;
+}
+
+void Configuration::copySlots(const Configuration &from, int begin, int end) {
+  for (int p = 0; p < planes; ++p) std::copy(from.values_[p] + begin, from.values_[p] + end, values_[p] + begin);
+}
+
+void Configuration::copyEnds(const Elements &elements, int r, const Configuration &from) {
+  const RodRange &rod = elements.rods[r];
+  copySlots(from, rod.first_slot - 1, rod.first_slot);
+  copySlots(from, rod.vertexEnd() - 1, rod.vertexEnd());
+  for (const LooseCell &cell : elements.loose[r])
+    for (const int slot : {cell.slot, cell.frame0, cell.frame1}) copySlots(from, slot, slot + 1);
+}
+
+void Configuration::copyRod(const Elements &elements, int r, const Configuration &from) {
+  const RodRange &rod = elements.rods[r];
+  copySlots(from, rod.first_slot, rod.vertexEnd() + 2);
+  copyEnds(elements, r, from);
+}
+
+void Configuration::closeRing(const RodRange &rod) {
+  if (!rod.closed) return;
+  const int behind = rod.vertexEnd();
+  for (const int i : {0, 1}) values_.setVector(position, behind + i, positionAt(rod.slot(i)));
+  setFrame(behind, frameAt(rod.slot(0)));
+  for (const Plane p : {strain, spin, axial_force}) values_[p][behind] = values_[p][rod.slot(0)];
+}
+
 State initialState(const Scene &scene, const Elements &elements) {
   State s;
   for (const Rod &rod : scene.rods) {
@@ -20,7 +56,7 @@ State initialState(const Scene &scene, const Elements &elements) {
   }
   s.twist_rate.assign(s.director.size(), 0.0);
   s.axial_force.assign(s.director.size(), 0.0);
-  s.turns.assign(elements.cells.size(), 0.0);
+  s.turns.assign(elements.cell_slot.size(), 0.0);
   const Configuration c = configurationOf(s, scene, elements, 0);
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
     const Rod &rod = scene.rods[r];
@@ -28,8 +64,8 @@ State initialState(const Scene &scene, const Elements &elements) {
     double length = 0;
     for (int i = 0; i < rod.edges(); ++i) length += rod.edge(i).norm();
     for (int n = elements.rod_cells[r]; n < elements.rod_cells[r + 1]; ++n) {
-      const double expected = 2 * pi * rod.initial_turns * elements.cells.length[n] / length;
-      s.turns[n] = 2 * pi * std::round((expected - c.twist[n]) / (2 * pi));
+      const double expected = 2 * pi * rod.initial_turns * elements.cellLength()[elements.cell_slot[n]] / length;
+      s.turns[n] = 2 * pi * std::round((expected - c[Configuration::twist][elements.cell_slot[n]]) / (2 * pi));
     }
   }
   for (const Support &support : scene.supports)
@@ -42,26 +78,43 @@ Frame supportFrame(const Support &support, double motion_time) {
   return {r * support.frame.tangent, r * support.frame.director, 1.0};
 }
 
-Configuration configurationOf(const State &state, const Scene &scene, const Elements &elements, double motion_time) {
-  Configuration c;
-  const std::size_t ne = state.director.size();
-  c.position = state.position;
-  c.frame.resize(elements.frames);
-  c.strain.resize(ne);
-  for (std::size_t i = 0; i < ne; ++i) {
-    const Vec3 e = state.position[elements.vertex1[i]] - state.position[elements.vertex0[i]];
-    const double length = e.norm();
-    c.frame[i] = {e / length, state.director[i], length};
-    c.strain[i] = axialStrain(length, elements.inverse_rest_length[i]);
-  }
+void setConfiguration(const State &state, const Scene &scene, const Elements &elements, double motion_time, Configuration &c) {
   for (std::size_t s = 0; s < scene.supports.size(); ++s)
-    if (elements.support_frame[s] >= 0) c.frame[elements.support_frame[s]] = supportFrame(scene.supports[s], motion_time);
-  c.spin.assign(ne, 0.0);
-  c.turns = state.turns;
-  c.twist.assign(state.turns.size(), 0.0);
-  for (int n = 0; n < elements.cells.size(); ++n)
-    c.twist[n] = halfAngleBetween(c.frame[elements.cells.frame0[n]], c.frame[elements.cells.frame1[n]]).angle() + c.turns[n];
-  c.axial_force = state.axial_force;
+    if (elements.support_slot[s] >= 0) c.setFrame(elements.support_slot[s], supportFrame(scene.supports[s], motion_time));
+  for (std::size_t n = 0; n < state.turns.size(); ++n) c[Configuration::turns][elements.cell_slot[n]] = state.turns[n];
+  for (std::size_t r = 0; r < elements.rods.size(); ++r) {
+    const RodRange &rod = elements.rods[r];
+    for (int i = 0; i < rod.vertices; ++i)
+      for (int a = 0; a < 3; ++a) c[Configuration::Plane(Configuration::position + a)][rod.slot(i)] = state.position[rod.first_vertex + i][a];
+    c.closeRing(rod);
+    for (int i = 0; i < rod.edges; ++i) {
+      for (int a = 0; a < 3; ++a) c[Configuration::Plane(Configuration::director + a)][rod.slot(i)] = state.director[rod.first_edge + i][a];
+      c[Configuration::axial_force][rod.slot(i)] = state.axial_force[rod.first_edge + i];
+      c[Configuration::spin][rod.slot(i)] = 0;
+    }
+    for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
+      using std::sqrt;
+      const Pack::mask_type live = firstLanes(rod.edgeEnd() - s);
+      const Vector3<Pack> e = c.positions<Pack>(s + 1) - c.positions<Pack>(s);
+      const Pack l = sqrt(e.squaredNorm()), length = select(live, l, read<Pack>(c[Configuration::length] + s));
+      for (int a = 0; a < 3; ++a) {
+        double *t = c[Configuration::Plane(Configuration::tangent + a)] + s;
+        write(t, select(live, Pack(e[a] / l), read<Pack>(t)));
+      }
+      write(c[Configuration::length] + s, length);
+      write(c[Configuration::strain] + s, axialStrain<Pack>(length, read<Pack>(elements.inverseRestLength() + s)));
+    }
+    c.closeRing(rod);
+    forCells(elements, int(r), [&]<class T>(const LooseCell &cell, int count) {
+      const auto [f0, f1] = cellFrames<T>(c, cell, count);
+      write(c[Configuration::twist] + cell.slot, T(halfAngleBetween(f0, f1).angle() + read<T>(c[Configuration::turns] + cell.slot)));
+    });
+  }
+}
+
+Configuration configurationOf(const State &state, const Scene &scene, const Elements &elements, double motion_time) {
+  Configuration c(elements.slots);
+  setConfiguration(state, scene, elements, motion_time, c);
   return c;
 }
 

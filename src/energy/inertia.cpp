@@ -7,89 +7,82 @@ namespace {
 
 class Inertia final : public Term {
 public:
-  Inertia(const Scene &scene, const Elements &elements) : scene_(scene), elements_(elements) {}
+  Inertia(const Scene &scene, const Elements &elements) : scene_(scene), elements_(elements), predicted_(slot_size, elements.slots), weight_(scene.rods.size()) {}
 
   /// m/(2 dt^2) |x - x_n - dt v_n|^2 + alpha m/(2 dt) |x - x_n|^2 as one quadratic; the same for the twist increment.
-  void beginStep(const State &start, const Configuration &configuration, const Step &step) override {
-    start_ = configuration.frame;
-    predicted_ = start.position;
-    twist_predicted_.resize(start.twist_rate.size());
-    weight_.resize(elements_.rods.size());
+  void beginStep(const State &state, const Configuration &start, const Step &step) override {
+    start_ = &start;
     for (std::size_t r = 0; r < elements_.rods.size(); ++r) {
       const RodRange &rod = elements_.rods[r];
       const double alpha = scene_.rods[r].material.mass_damping_coefficient;
       weight_[r] = 1 / (step.dt * step.dt) + alpha / step.dt;
       const double reach = step.dt / (1 + alpha * step.dt);
-      for (int v = rod.first_vertex; v < rod.first_vertex + rod.vertices; ++v) predicted_[v] += reach * start.velocity[v];
-      for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) twist_predicted_[i] = reach * start.twist_rate[i];
+      for (int i = 0; i < rod.vertices; ++i)
+        for (int a = 0; a < 3; ++a) predicted_[a][rod.slot(i)] = state.position[rod.first_vertex + i][a] + reach * state.velocity[rod.first_vertex + i][a];
+      for (int i = 0; i < rod.edges; ++i) predicted_[3][rod.slot(i)] = reach * state.twist_rate[rod.first_edge + i];
     }
   }
 
-  double energy(const Configuration &c, int r) const override {
+  [[gnu::flatten]] double energy(const Configuration &c, int r) const override {
     const RodRange &rod = elements_.rods[r];
-    double sum = 0;
-    for (int v = rod.first_vertex; v < rod.first_vertex + rod.vertices; ++v) sum += elements_.mass[v] * (c.position[v] - predicted_[v]).squaredNorm();
-    if (hasTwist(rod))
-      for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
-        const double d = spin(c, i) - twist_predicted_[i];
-        sum += elements_.twist_mass[i] * d * d;
+    Pack total(0.0);
+    for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes)
+      total += read<Pack>(elements_.mass() + s) * (c.positions<Pack>(s) - readVector<Pack>(predicted_, 0, s)).squaredNorm();
+    if (rod.twist)
+      for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
+        const Pack d = spinOver(c, s)[0] - read<Pack>(predicted_[3] + s);
+        total += read<Pack>(elements_.twistMass() + s) * d * d;
       }
-    return 0.5 * weight_[r] * sum;
+    return 0.5 * weight_[r] * reduce(total);
   }
 
-  void addDerivatives(const Configuration &c, int r, Rows &rows, HessianKind) const override {
+  [[gnu::flatten]] void addDerivatives(const Configuration &c, int r, Derivatives &out, HessianKind) const override {
     const RodRange &rod = elements_.rods[r];
-    for (int v = rod.first_vertex; v < rod.first_vertex + rod.vertices; ++v) {
-      const int row = elements_.vertex_row[v];
-      const double w = weight_[r] * elements_.mass[v];
+    std::array<double *, slot_entries> entry;
+    for (int e = 0; e < slot_entries; ++e) entry[e] = out.band.entry(rod, e / band_width, e % band_width) - rod.first_slot;
+    for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) {
+      const Pack w = read<Pack>(elements_.mass() + s) * Pack(weight_[r]);
       for (int a = 0; a < 3; ++a) {
-        rows.gradient[row + a] += w * (c.position[v][a] - predicted_[v][a]);
-        rows.band[std::size_t(row + a) * DofMap::band] += w;
+        addTo<Pack>(out.equilibrium[a] + s, w * (read<Pack>(c[Configuration::Plane(Configuration::position + a)] + s) - read<Pack>(predicted_[a] + s)));
+        addTo(entry[a * band_width] + s, w);
       }
     }
-    if (!hasTwist(rod)) return;
-    for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
+    if (!rod.twist) return;
+    for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
       // Whole turns by continuity: the target is moved by them instead of the angle.
-      const double turns = spin(c, i) - twistIncrement(start_[i], c.frame[i]);
-      const auto d = twistInertia(start_[i], c.frame[i], weight_[r] * elements_.twist_mass[i], twist_predicted_[i] - turns);
-      addEdge(d, elements_.edge_row[i], rows);
+      const Pack target = read<Pack>(predicted_[3] + s) - spinOver(c, s)[1];
+      const auto d = twistInertia<Pack>(start_->frames<Pack>(s), c.frames<Pack>(s), Pack(weight_[r]) * read<Pack>(elements_.twistMass() + s), target);
+      addTo(out.equilibrium[3] + s, d.gradient[3]);
+      addTo(entry[3 * band_width] + s, d.hessian[9]);
+      int k = 0;
+      for (int a = 0; a < 3; ++a) {
+        addTo<Pack>(out.equilibrium[a] + s, -d.gradient[a]);
+        addTo(out.equilibrium[a] + s + 1, d.gradient[a]);
+        for (int b = a; b < 3; ++b, ++k) {
+          addTo(entry[a * band_width + b - a] + s, d.hessian[k]);
+          addTo(entry[a * band_width + b - a] + s + 1, d.hessian[k]);
+          addTo<Pack>(entry[a * band_width + slot_size + b - a] + s, -d.hessian[k]);
+          if (b != a) addTo<Pack>(entry[b * band_width + slot_size + a - b] + s, -d.hessian[k]);
+        }
+        addTo<Pack>(entry[a * band_width + 3 - a] + s, -d.hessian[k]);
+        addTo(entry[3 * band_width + 1 + a] + s, d.hessian[k]);
+        ++k;
+      }
     }
   }
 
 private:
   const Scene &scene_;
   const Elements &elements_;
-  std::vector<Frame> start_;
-  std::vector<Vec3> predicted_;
-  std::vector<double> twist_predicted_, weight_;
+  const Configuration *start_ = nullptr;
+  Planes predicted_; ///< positions, and twists since the start
+  std::vector<double> weight_;
 
-  static bool hasTwist(const RodRange &rod) { return rod.stride == 4; }
-
-  /// Twist of an edge over the step, whole turns by continuity with the sum of the retractions.
-  double spin(const Configuration &c, int i) const {
-    const double principal = twistIncrement(start_[i], c.frame[i]);
-    return principal + 2 * pi * std::round((c.spin[i] - principal) / (2 * pi));
-  }
-
-  /// Derivatives over (e, theta) to the rows of v0 (3), theta, v1 (3).
-  static void addEdge(const TwistInertiaDerivatives<double> &d, int row, Rows &rows) {
-    auto band = [&](int r, int c) -> double & { return rows.band[std::size_t(row + r) * DofMap::band + (c - r)]; };
-    rows.gradient[row + 3] += d.gradient[3];
-    int k = 0;
-    for (int a = 0; a < 3; ++a) {
-      rows.gradient[row + a] -= d.gradient[a];
-      rows.gradient[row + 4 + a] += d.gradient[a];
-      for (int b = a; b < 3; ++b, ++k) {
-        band(a, b) += d.hessian[k];
-        band(4 + a, 4 + b) += d.hessian[k];
-        band(a, 4 + b) -= d.hessian[k];
-        if (b != a) band(b, 4 + a) -= d.hessian[k];
-      }
-      band(a, 3) -= d.hessian[k];
-      band(3, 4 + a) += d.hessian[k];
-      ++k;
-    }
-    band(3, 3) += d.hessian[9];
+  /// Twist of edges over the step, whole turns by continuity with the sum of the retractions; and those turns alone.
+  std::array<Pack, 2> spinOver(const Configuration &c, int s) const {
+    const Pack principal = twistIncrement(start_->frames<Pack>(s), c.frames<Pack>(s));
+    const Pack turns = 2 * pi * round((read<Pack>(c[Configuration::spin] + s) - principal) * Pack(0.5 / pi));
+    return {principal + turns, turns};
   }
 };
 

@@ -8,95 +8,94 @@ namespace {
 /// no potential over large rotations, so it is measured from the last iterate: all that a line search compares starts there.
 class Load final : public Term {
 public:
-  Load(const Scene &scene, const Elements &elements) : scene_(scene), elements_(elements), couples_(scene.rods.size()) {
-    force_.assign(elements.mass.size(), Vec3::Zero());
-    for (const NodalForce &f : scene.forces) force_[elements.rods[f.rod].first_vertex + f.vertex] += f.force;
-    for (const EdgeMoment &m : scene.moments) couples_[m.rod].push_back({m, Vec3::Zero(), 0.0});
+  Load(const Scene &scene, const Elements &elements) : elements_(elements), full_(3, elements.slots), force_(full_), couples_(scene.rods.size()) {
+    for (std::size_t r = 0; r < scene.rods.size(); ++r)
+      if (scene.rods[r].gravity)
+        for (int s = elements.rods[r].first_slot; s < elements.rods[r].vertexEnd(); ++s) full_.setVector(0, s, elements.mass()[s] * scene.gravity);
+    for (const NodalForce &f : scene.forces) {
+      const int s = elements.rods[f.rod].slot(f.vertex);
+      full_.setVector(0, s, full_.vector(0, s) + f.force);
+    }
+    for (const EdgeMoment &m : scene.moments) couples_[m.rod].push_back({m, elements.rods[m.rod].slot(m.edge), Vec3::Zero(), 0.0});
   }
 
-  void beginStep(const State &start, const Configuration &configuration, const Step &step) override {
-    start_ = start.position;
-    factor_ = step.load_factor;
-    moveIterate(configuration);
+  void beginStep(const State &, const Configuration &start, const Step &step) override {
+    start_ = &start;
+    setLoadFactor(step.load_factor);
+    for (std::size_t r = 0; r < couples_.size(); ++r) moveIterate(start, int(r));
   }
 
-  void moveIterate(const Configuration &iterate) override {
-    for (std::size_t r = 0; r < couples_.size(); ++r)
-      for (Couple &m : couples_[r]) {
-        const int i = elements_.rods[r].first_edge + m.edge;
-        m.tangent = iterate.frame[i].tangent;
-        m.spin = iterate.spin[i];
-      }
+  void moveIterate(const Configuration &iterate, int rod) override {
+    for (Couple &m : couples_[rod]) {
+      m.tangent = iterate.frameAt(m.slot).tangent;
+      m.spin = iterate[Configuration::spin][m.slot];
+    }
   }
 
-  void setLoadFactor(double factor) override { factor_ = factor; }
+  void setLoadFactor(double factor) override {
+    if (factor == factor_) return;
+    factor_ = factor;
+    for (std::size_t k = 0; k < full_.size(); ++k) force_.data()[k] = factor * full_.data()[k];
+  }
 
   double energy(const Configuration &c, int r) const override {
     const RodRange &rod = elements_.rods[r];
-    double sum = 0;
-    for (int v = rod.first_vertex; v < rod.first_vertex + rod.vertices; ++v) sum -= forceOn(r, v).dot(c.position[v] - start_[v]);
+    Pack work(0.0);
+    for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) work += readVector<Pack>(force_, 0, s).dot(c.positions<Pack>(s) - start_->positions<Pack>(s));
+    double sum = -reduce(work);
     for (const Couple &m : couples_[r]) {
-      const int i = rod.first_edge + m.edge;
-      const Vec3 &t = c.frame[i].tangent, axis = m.tangent.cross(t);
+      const Vec3 t = c.frameAt(m.slot).tangent, axis = m.tangent.cross(t);
       const double sine = axis.norm(), turning = sine > 0 ? std::atan2(sine, m.tangent.dot(t)) / sine : 1;
       const Vec3 mean = (m.tangent + t).normalized();
-      sum -= factor_ * ((m.torque + m.moment.dot(mean)) * (c.spin[i] - m.spin) + turning * m.moment.dot(axis));
+      sum -= factor_ * ((m.torque + m.moment.dot(mean)) * (c[Configuration::spin][m.slot] - m.spin) + turning * m.moment.dot(axis));
     }
     return sum;
   }
 
-  void addDerivatives(const Configuration &c, int r, Rows &rows, HessianKind) const override {
+  void addDerivatives(const Configuration &c, int r, Derivatives &out, HessianKind) const override {
     const RodRange &rod = elements_.rods[r];
-    for (int v = rod.first_vertex; v < rod.first_vertex + rod.vertices; ++v) {
-      const Vec3 f = forceOn(r, v);
-      for (int a = 0; a < 3; ++a) rows.gradient[elements_.vertex_row[v] + a] -= f[a];
-    }
+    for (int a = 0; a < 3; ++a)
+      for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) addTo<Pack>(out.equilibrium[a] + s, -read<Pack>(force_[a] + s));
     for (const Couple &m : couples_[r]) {
-      const int i = rod.first_edge + m.edge, row = elements_.edge_row[i];
-      const Frame &f = c.frame[i];
+      const Frame f = c.frameAt(m.slot);
       const Vec3 pair = factor_ * m.moment.cross(f.tangent) / f.length;
-      rows.gradient[row + 3] -= factor_ * (m.torque + m.moment.dot(f.tangent));
+      out.equilibrium[3][m.slot] -= factor_ * (m.torque + m.moment.dot(f.tangent));
       for (int a = 0; a < 3; ++a) {
-        rows.gradient[row + a] += pair[a];
-        rows.gradient[row + 4 + a] -= pair[a];
+        out.equilibrium[a][m.slot] += pair[a];
+        out.equilibrium[a][m.slot + 1] -= pair[a];
       }
-      addCoupleHessian(factor_ * m.moment, f, row, rows);
+      addCoupleHessian(factor_ * m.moment, f, rod, m.slot - rod.first_slot, out.band);
     }
   }
 
 private:
   struct Couple : EdgeMoment {
+    int slot;
     Vec3 tangent; ///< at the iterate
     double spin;
   };
-  const Scene &scene_;
   const Elements &elements_;
-  std::vector<Vec3> force_, start_;
+  Planes full_, force_; ///< forces on vertices [N] at load factor 1, and now
   std::vector<std::vector<Couple>> couples_;
-  double factor_ = 1;
-
-  Vec3 forceOn(int rod, int vertex) const {
-    const Vec3 weight = scene_.rods[rod].gravity ? Vec3(elements_.mass[vertex] * scene_.gravity) : Vec3(Vec3::Zero());
-    return factor_ * (force_[vertex] + weight);
-  }
+  const Configuration *start_ = nullptr;
+  double factor_ = 0;
 
   /// Symmetric part of the derivative of the gradient of a couple over (e, theta): with g_e = -(M x t)/l and g_theta = -M.t,
   /// d g_e/d e = -[M]x (I - 2 t t')/l^2 ... symmetrised, d g_theta/d e = -(I - t t') M/l and d g_e/d theta = 0.
-  static void addCoupleHessian(const Vec3 &moment, const Frame &f, int row, Rows &rows) {
+  static void addCoupleHessian(const Vec3 &moment, const Frame &f, const RodRange &rod, int i, Band &band) {
     const Vec3 &t = f.tangent;
     const double inverse = 1 / f.length;
     const Vec3 cross = moment.cross(t), off = (moment - t * moment.dot(t)) * (-0.5 * inverse);
     const Mat3 h = (cross * t.transpose() + t * cross.transpose()) * (inverse * inverse);
-    auto band = [&](int r, int c) -> double & { return rows.band[std::size_t(row + r) * DofMap::band + (c - r)]; };
     for (int a = 0; a < 3; ++a) {
-      band(a, 3) -= off[a];
-      band(3, 4 + a) += off[a];
+      band.entry(rod, a, 3 - a)[i] -= off[a];
+      band.entry(rod, 3, 1 + a)[i] += off[a];
       for (int b = 0; b < 3; ++b) {
         if (b >= a) {
-          band(a, b) += h(a, b);
-          band(4 + a, 4 + b) += h(a, b);
+          band.entry(rod, a, b - a)[i] += h(a, b);
+          band.entry(rod, a, b - a)[i + 1] += h(a, b);
         }
-        band(a, 4 + b) -= h(a, b);
+        band.entry(rod, a, slot_size + b - a)[i] -= h(a, b);
       }
     }
   }

@@ -13,35 +13,37 @@ public:
 
   double energy(const Configuration &configuration, int r) const override {
     const RodRange &rod = elements_.rods[r];
-    double sum = 0;
-    for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
-      const double s = configuration.strain[i] - law_.rest[i];
-      sum += 0.5 * law_.stiffness[i] * s * s * elements_.rest_length[i];
+    Pack total(0.0);
+    for (int i = rod.first_slot; i < rod.edgeEnd(); i += lanes) {
+      const Pack s = read<Pack>(configuration[Configuration::strain] + i) - read<Pack>(law_.rest() + i);
+      total += read<Pack>(law_.stiffness() + i) * s * s * read<Pack>(elements_.restLength() + i);
     }
-    return sum;
+    return 0.5 * reduce(total);
   }
 
-  void addDerivatives(const Configuration &configuration, int r, Rows &rows, HessianKind hessian) const override {
+  [[gnu::flatten]] void addDerivatives(const Configuration &configuration, int r, Derivatives &out, HessianKind hessian) const override {
     const RodRange &rod = elements_.rods[r];
-    for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
-      const Frame &f = configuration.frame[i];
-      const double inverse = elements_.inverse_rest_length[i];
-      const double primal = law_.stiffness[i] * (configuration.strain[i] - law_.rest[i]);
-      const double force = mixed_ ? configuration.axial_force[i] : primal;
-      const Vec3 g = stretchGradient(f, primal, inverse), e = stretchGradient(f, force, inverse);
-      const Mat3 h = stretchHessian(f, law_.stiffness[i], hessian == HessianKind::exact ? force : std::max(force, 0.0), inverse);
-      const int row = elements_.edge_row[i], stride = rod.stride;
+    double *entry[3][band_width];
+    for (int a = 0; a < 3; ++a)
+      for (int k = 0; k < band_width; ++k) entry[a][k] = out.band.entry(rod, a, k) - rod.first_slot;
+    for (int i = rod.first_slot; i < rod.edgeEnd(); i += lanes) {
+      const Pack::mask_type live = firstLanes(rod.edgeEnd() - i); // the copies behind a ring have forces, too
+      const Pack stiffness = read<Pack>(law_.stiffness() + i), inverse = read<Pack>(elements_.inverseRestLength() + i);
+      const Pack primal = stiffness * (read<Pack>(configuration[Configuration::strain] + i) - read<Pack>(law_.rest() + i));
+      const Pack force = select(live, mixed_ ? read<Pack>(configuration[Configuration::axial_force] + i) : primal, Pack(0.0));
+      const FrameOf<Pack> f = configuration.frames<Pack>(i);
+      const Vector3<Pack> e = stretchGradient(f, force, inverse), g = stretchGradient<Pack>(f, select(live, primal - force, Pack(0.0)), inverse);
+      const Matrix3<Pack> h = stretchHessian<Pack>(f, stiffness, hessian == HessianKind::exact ? force : max(force, Pack(0.0)), inverse);
       for (int a = 0; a < 3; ++a) {
-        rows.gradient[row + a] -= g[a];
-        rows.gradient[row + stride + a] += g[a];
-        rows.equilibrium[row + a] -= e[a];
-        rows.equilibrium[row + stride + a] += e[a];
-        double *first = &rows.band[std::size_t(row + a) * DofMap::band], *second = &rows.band[std::size_t(row + stride + a) * DofMap::band];
+        addTo<Pack>(out.equilibrium[a] + i, -e[a]);
+        addTo(out.equilibrium[a] + i + 1, e[a]);
+        addTo<Pack>(out.gradient[a] + i, -g[a]);
+        addTo(out.gradient[a] + i + 1, g[a]);
         for (int b = a; b < 3; ++b) {
-          first[b - a] += h(a, b);
-          second[b - a] += h(a, b);
+          addTo(entry[a][b - a] + i, h(a, b));
+          addTo(entry[a][b - a] + i + 1, h(a, b));
         }
-        for (int b = 0; b < 3; ++b) first[stride + b - a] -= h(a, b);
+        for (int b = 0; b < 3; ++b) addTo<Pack>(entry[a][slot_size + b - a] + i, -h(a, b));
       }
     }
   }
@@ -54,18 +56,20 @@ private:
 
 } // namespace
 
+AxialLaw::AxialLaw(const Scene &scene, const Elements &elements) : scene_(scene), elements_(elements), planes_(2, elements.slots) {
+  std::copy_n(elements.axialStiffness(), elements.slots, planes_[0]);
+}
+
 /// Dissipation as in the bending term: a second quadratic around the strain at the start.
-void AxialLaw::beginStep(const Scene &scene, const Elements &elements, const Configuration &start, const Step &step) {
-  stiffness = elements.axial_stiffness;
-  rest.assign(stiffness.size(), 0.0);
-  for (std::size_t r = 0; r < scene.rods.size(); ++r) {
-    const double beta = scene.rods[r].material.stiffness_damping_coefficient;
-    if (beta == 0 || step.isStatic()) continue;
-    const double q = beta / step.dt;
-    const RodRange &rod = elements.rods[r];
-    for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
-      stiffness[i] *= 1 + q;
-      rest[i] = q / (1 + q) * start.strain[i];
+void AxialLaw::beginStep(const Configuration &start, const Step &step) {
+  for (std::size_t r = 0; r < scene_.rods.size(); ++r) {
+    const double beta = scene_.rods[r].material.stiffness_damping_coefficient;
+    if (beta == 0) continue;
+    const double q = step.isStatic() ? 0 : beta / step.dt;
+    const RodRange &rod = elements_.rods[r];
+    for (int i = rod.first_slot; i < rod.edgeEnd(); ++i) {
+      planes_[0][i] = elements_.axialStiffness()[i] * (1 + q);
+      planes_[1][i] = q / (1 + q) * start[Configuration::strain][i];
     }
   }
 }

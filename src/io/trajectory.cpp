@@ -25,7 +25,7 @@ const Field fields[] = {
     {"turns", On::cells, 1, [](const State &s) { return s.turns.data(); }}, // measure `angle`: 2 pi x whole turns of each cell's twist [rad]
 };
 
-std::array<int, 3> sizes(const Elements &e) { return {int(e.mass.size()), int(e.vertex0.size()), e.cells.size()}; }
+std::array<int, 3> sizes(const Elements &e) { return {e.vertices(), e.edges(), int(e.cell_slot.size())}; }
 
 template <class Get> std::vector<double> perRod(const Scene &scene, Get get) {
   std::vector<double> values;
@@ -79,7 +79,7 @@ std::vector<double> Diagnostics::values() const {
 
 TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene, const Elements &elements, const Provenance &provenance,
                                    const std::set<std::string> &wanted)
-    : folder_(folder), rods_(elements.rods.size()), vertices_(int(elements.mass.size())), edges_(int(elements.vertex0.size())),
+    : folder_(folder), rods_(elements.rods.size()), vertices_(elements.vertices()), edges_(elements.edges()),
       file_(Hdf5File::create(folder + "/trajectory.h5")) {
   writeHeader(scene, elements, provenance);
   file_.createGroup("state");

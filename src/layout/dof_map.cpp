@@ -34,7 +34,7 @@ PetscErrorCode createLocalVector(DM dm, Vec *v) {
 } // namespace
 
 /// Section over the points v0, e0, v1, e1, ... of every rod; the last vertex of an open rod has no edge after it.
-PetscErrorCode DofMap::createSection(const Scene &scene, PetscSection *section) const {
+PetscErrorCode DofMap::createSection(PetscSection *section) const {
   PetscFunctionBeginUser;
   PetscInt points = 0;
   for (const RodRange &r : rods_) points += r.vertices + r.edges;
@@ -57,7 +57,7 @@ PetscErrorCode DofMap::createSection(const Scene &scene, PetscSection *section) 
       }
       if (i == rods_[r].edges) continue;
       const PetscInt edge = point++;
-      if (scene.rods[r].material.isCable()) continue;
+      if (!rods_[r].twist) continue;
       PetscCall(PetscSectionSetDof(*section, edge, 1));
       PetscCall(PetscSectionSetFieldDof(*section, edge, 1, 1));
     }
@@ -75,25 +75,23 @@ PetscErrorCode DofMap::createSection(const Scene &scene, PetscSection *section) 
 
 PetscErrorCode DofMap::setUp(const Scene &scene) {
   PetscFunctionBeginUser;
-  constexpr int spare = 4, copies = 8;
   rods_.clear();
   vertices_ = edges_ = 0;
-  rows_ = spare;
+  slots_ = lanes; // room for the frame before the first rod
   for (const Rod &rod : scene.rods) {
-    const int stride = rod.material.isCable() ? 3 : 4;
-    const int rows = 3 * rod.vertices() + (stride == 4 ? rod.edges() : 0);
-    rods_.push_back({vertices_, rod.vertices(), edges_, rod.edges(), rows_, rows, stride, rod.closed});
+    // Two slots behind the last vertex, one before the next rod, and a pack between, so that no pack holds parts of two rods.
+    const int slots = Planes::planeStride(rod.vertices() + 3 + lanes);
+    rods_.push_back({vertices_, rod.vertices(), edges_, rod.edges(), slots_, slots, !rod.material.isCable(), rod.closed});
     vertices_ += rod.vertices();
     edges_ += rod.edges();
-    rows_ += rows + copies;
+    slots_ += slots;
   }
-  rows_ += band; // the band of the last row ends inside the array
   held_.assign(vertices_, false);
   for (const Support &s : scene.supports)
     if (s.holdsPosition()) held_[rods_[s.rod].first_vertex + s.vertex] = true;
 
   OwnedSection section;
-  PetscCall(createSection(scene, section.out()));
+  PetscCall(createSection(section.out()));
   PetscCall(DMShellCreate(PETSC_COMM_WORLD, dm_.out()));
   PetscCall(DMSetLocalSection(dm_, section));
   PetscCall(DMShellSetCreateGlobalVector(dm_, createGlobalVector));
@@ -102,54 +100,57 @@ PetscErrorCode DofMap::setUp(const Scene &scene) {
   PetscCall(DMGetGlobalSection(dm_, &global));
   PetscCall(PetscSectionGetConstrainedStorageSize(global, &unknowns_));
 
-  unknown_of_row_.assign(rows_, -1);
+  unknown_.assign(std::size_t(slots_) * slot_size, -1);
   PetscInt point = 0;
   for (const RodRange &rod : rods_)
     for (int i = 0; i < rod.vertices; ++i) {
-      const int row = vertexRow(rod, i);
+      PetscInt *here = &unknown_[std::size_t(slot_size) * rod.slot(i)];
       PetscInt offset;
       PetscCall(PetscSectionGetOffset(global, point++, &offset));
       if (!held_[rod.first_vertex + i])
-        for (int k = 0; k < 3; ++k) unknown_of_row_[row + k] = offset + k;
+        for (int a = 0; a < 3; ++a) here[a] = offset + a;
       if (i == rod.edges) continue;
-      if (rod.stride == 4) {
+      if (rod.twist) {
         PetscCall(PetscSectionGetOffset(global, point, &offset));
-        unknown_of_row_[row + 3] = offset;
+        here[3] = offset;
       }
       ++point;
     }
-  for (const RodRange &rod : rods_)
-    if (rod.closed)
-      for (int k = 0; k < rod.stride + 3; ++k) unknown_of_row_[rod.first_row + rod.rows + k] = unknown_of_row_[rod.first_row + k];
   PetscFunctionReturn(0);
 }
 
+namespace {
+
+/// Slot and unknown `k` after unknown `a` of a slot; those behind a ring are its first.
+std::array<int, 2> neighbour(const RodRange &rod, int i, int a, int k) {
+  const int j = i + (a + k) / slot_size;
+  return {rod.slot(rod.closed && j >= rod.vertices ? j - rod.vertices : j), (a + k) % slot_size};
+}
+
+} // namespace
+
 PetscErrorCode DofMap::createMatrix(Mat *matrix) {
   PetscFunctionBeginUser;
-  std::vector<PetscInt> i, j;
-  auto &slots = band_slot_;
-  slots.clear();
-  for (int r = 0; r < rows_ - band; ++r)
-    for (int k = 0; k < band; ++k) {
-      const PetscInt a = unknown_of_row_[r], b = unknown_of_row_[r + k];
-      if (a < 0 || b < 0) continue;
-      slots.push_back(r * band + k);
-    }
-  // A pair of rows of two different rods never meets in a cell; its slot stays zero and must not enter the pattern.
-  std::vector<int> rod_of_row(rows_, -1);
-  for (std::size_t n = 0; n < rods_.size(); ++n)
-    for (int k = 0; k < rods_[n].rows + 8 && rods_[n].first_row + k < rows_; ++k) rod_of_row[rods_[n].first_row + k] = int(n);
-  std::erase_if(slots, [&](PetscInt s) { return rod_of_row[s / band] != rod_of_row[s / band + s % band]; });
-  for (const PetscInt s : slots) {
-    i.push_back(unknown_of_row_[s / band]);
-    j.push_back(unknown_of_row_[s / band + s % band]);
-  }
-  const std::size_t upper = slots.size();
+  std::vector<PetscInt> row, column;
+  source_.clear();
+  for (const RodRange &rod : rods_)
+    for (int i = 0; i < rod.vertices; ++i)
+      for (int a = 0; a < slot_size; ++a)
+        for (int k = 0; k < band_width; ++k) {
+          if (!rod.closed && i + (a + k) / slot_size >= rod.vertices) continue;
+          const auto [slot, b] = neighbour(rod, i, a, k);
+          const PetscInt u = unknown(rod.slot(i), a), v = unknown(slot, b);
+          if (u < 0 || v < 0) continue;
+          row.push_back(u);
+          column.push_back(v);
+          source_.push_back(Band::offset(rod, a, k) + i);
+        }
+  const std::size_t upper = source_.size();
   for (std::size_t n = 0; n < upper; ++n)
-    if (slots[n] % band != 0) {
-      i.push_back(j[n]);
-      j.push_back(i[n]);
-      slots.push_back(slots[n]);
+    if (row[n] != column[n]) {
+      row.push_back(column[n]);
+      column.push_back(row[n]);
+      source_.push_back(source_[n]);
     }
   PetscCall(MatCreate(PETSC_COMM_WORLD, matrix));
   PetscCall(MatSetSizes(*matrix, unknowns_, unknowns_, PETSC_DETERMINE, PETSC_DETERMINE));
@@ -157,37 +158,95 @@ PetscErrorCode DofMap::createMatrix(Mat *matrix) {
   PetscCall(MatSetFromOptions(*matrix));
   PetscCall(MatSetOption(*matrix, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(MatSetOption(*matrix, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
-  PetscCall(MatSetPreallocationCOO(*matrix, PetscCount(i.size()), i.data(), j.data()));
-  entries_.resize(slots.size());
+  PetscCall(MatSetPreallocationCOO(*matrix, PetscCount(row.size()), row.data(), column.data()));
+  entries_.resize(source_.size());
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode DofMap::fillMatrix(const std::vector<double> &band_values, Mat matrix) {
+PetscErrorCode DofMap::fillMatrix(const Band &band, Mat matrix) {
   PetscFunctionBeginUser;
-  for (std::size_t n = 0; n < band_slot_.size(); ++n) entries_[n] = band_values[band_slot_[n]];
+  for (std::size_t n = 0; n < source_.size(); ++n) entries_[n] = band.data()[source_[n]];
   PetscCall(MatSetValuesCOO(matrix, entries_.data(), INSERT_VALUES));
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode DofMap::gather(const std::vector<double> &row_values, Vec out) const {
-  PetscScalar *values;
+void DofMap::copyBehindRings(Planes &increment) const {
+  for (const RodRange &rod : rods_) {
+    if (!rod.closed) continue;
+    for (int a = 0; a < 3; ++a)
+      for (const int i : {0, 1}) increment[a][rod.slot(rod.vertices + i)] = increment[a][rod.slot(i)];
+    increment[3][rod.slot(rod.vertices)] = increment[3][rod.slot(0)];
+  }
+}
+
+void DofMap::fold(const RodRange &rod, Planes &sums) const {
+  if (!rod.closed) return;
+  for (int a = 0; a < slot_size; ++a)
+    for (const int i : {0, 1}) {
+      sums[a][rod.slot(i)] += sums[a][rod.slot(rod.vertices + i)];
+      sums[a][rod.slot(rod.vertices + i)] = 0;
+    }
+}
+
+void DofMap::fold(const RodRange &rod, Band &band) const {
+  if (!rod.closed) return;
+  for (int a = 0; a < slot_size; ++a)
+    for (int k = 0; k < band_width; ++k) {
+      double *entry = band.entry(rod, a, k);
+      for (const int i : {0, 1}) {
+        entry[i] += entry[rod.vertices + i];
+        entry[rod.vertices + i] = 0;
+      }
+    }
+}
+
+PetscErrorCode DofMap::gather(const Planes &values, Vec out, const std::vector<char> *wanted) const {
+  PetscScalar *to;
   PetscFunctionBeginUser;
-  PetscCall(VecGetArrayWrite(out, &values));
-  std::memset(values, 0, sizeof(PetscScalar) * unknowns_);
-  for (int r = 0; r < rows_; ++r)
-    if (unknown_of_row_[r] >= 0) values[unknown_of_row_[r]] += row_values[r];
-  PetscCall(VecRestoreArrayWrite(out, &values));
+  PetscCall(VecGetArrayWrite(out, &to));
+  for (std::size_t r = 0; r < rods_.size(); ++r) {
+    const double scale = wanted && !(*wanted)[r] ? 0 : 1;
+    const PetscInt *u = &unknown_[std::size_t(slot_size) * rods_[r].first_slot];
+    for (int s = rods_[r].first_slot; s < rods_[r].vertexEnd(); ++s, u += slot_size)
+      for (int a = 0; a < slot_size; ++a)
+        if (u[a] >= 0) to[u[a]] = scale * values[a][s];
+  }
+  PetscCall(VecRestoreArrayWrite(out, &to));
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode DofMap::scatter(Vec in, std::vector<double> &row_values) const {
-  const PetscScalar *values;
+PetscErrorCode DofMap::scatter(Vec in, Planes &values) const {
+  const PetscScalar *from;
   PetscFunctionBeginUser;
-  PetscCall(VecGetArrayRead(in, &values));
-  for (int r = 0; r < rows_; ++r)
-    if (unknown_of_row_[r] >= 0) row_values[r] = values[unknown_of_row_[r]];
-  PetscCall(VecRestoreArrayRead(in, &values));
+  PetscCall(VecGetArrayRead(in, &from));
+  for (const RodRange &rod : rods_) {
+    const PetscInt *u = &unknown_[std::size_t(slot_size) * rod.first_slot];
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s, u += slot_size)
+      for (int a = 0; a < slot_size; ++a) values[a][s] = u[a] >= 0 ? from[u[a]] : 0.0;
+  }
+  PetscCall(VecRestoreArrayRead(in, &from));
+  copyBehindRings(values);
   PetscFunctionReturn(0);
+}
+
+Band::Band(const DofMap &dofs) : data_(std::size_t(slot_entries) * dofs.slots() + 2 * lanes, 0.0) {}
+
+void Band::clear(const RodRange &rod) { std::fill_n(entry(rod, 0, 0) - 1, std::size_t(slot_entries) * rod.slots, 0.0); }
+
+void Band::subtractFrom(const Band &other) {
+  for (std::size_t k = 0; k < data_.size(); ++k) data_[k] = other.data_[k] - data_[k];
+}
+
+void Band::multiply(const RodRange &rod, const Planes &x, Planes &y) const {
+  for (int a = 0; a < slot_size; ++a)
+    for (int k = 0; k < band_width; ++k) {
+      const double *h = entry(rod, a, k);
+      const int away = (a + k) / slot_size, b = (a + k) % slot_size;
+      for (int i = 0; i < rod.vertices; ++i) {
+        y[a][rod.slot(i)] += h[i] * x[b][rod.slot(i + away)];
+        if (k > 0) y[b][rod.slot(i + away)] += h[i] * x[a][rod.slot(i)];
+      }
+    }
 }
 
 } // namespace tendril

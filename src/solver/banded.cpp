@@ -3,147 +3,309 @@
 #include <petsc/private/matimpl.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace tendril {
+namespace {
 
-bool BandedCholesky::analyse(PetscInt rows, const PetscInt *row_start, const PetscInt *column) {
-  rows_ = rows;
-  blocks_.clear();
-  far_.clear();
-  PetscInt begin = 0, reach = 0, first_far = -1;
-  for (PetscInt i = 0; i < rows; ++i) {
-    for (PetscInt k = row_start[i]; k < row_start[i + 1]; ++k) {
-      reach = std::max(reach, column[k]);
-      if (column[k] < i - half_band && first_far < 0) first_far = i;
-    }
-    if (reach > i) continue;
-    const int border = first_far < 0 ? 0 : int(i + 1 - first_far);
-    if (border > half_band + 1) return false;
-    blocks_.push_back({begin, i + 1, border});
-    far_.emplace_back(std::size_t(border) * std::size_t(i + 1 - begin), 0.0);
-    begin = i + 1;
-    first_far = -1;
-  }
-  band_.assign(std::size_t(rows + half_band + 1) * width, 0.0);
-  diagonal_.assign(rows, 0.0);
-  return true;
-}
+constexpr int half_band = band_width - 1;
+/// Rows of a ring that meet its first: the unknowns of its last two slots.
+constexpr int border = 2 * slot_size;
 
-void BandedCholesky::factor(const PetscInt *row_start, const PetscInt *column, const PetscScalar *value) {
-  std::fill(band_.begin(), band_.end(), 0.0);
-  negative_ = neutral_ = 0;
-  for (std::size_t n = 0; n < blocks_.size(); ++n) {
-    const Block &block = blocks_[n];
-    std::vector<double> &far = far_[n];
-    std::fill(far.begin(), far.end(), 0.0);
-    const PetscInt size = block.end - block.begin, first_border = block.end - block.border;
-    for (PetscInt i = block.begin; i < block.end; ++i)
-      for (PetscInt k = row_start[i]; k < row_start[i + 1]; ++k) {
-        const PetscInt distance = column[k] - i;
-        if (distance >= 0 && distance <= half_band)
-          band_[std::size_t(i) * width + distance] = value[k];
-        else if (distance > half_band)
-          far[std::size_t(column[k] - first_border) * size + (i - block.begin)] = value[k];
-      }
-    for (PetscInt i = block.begin; i < block.end; ++i) diagonal_[i] = band_[std::size_t(i) * width];
-    eliminate(block, far);
-  }
-}
+/// Numbers kept of a row: the inverse pivot, the couplings to the next ten, the diagonal before elimination. Padded for vector loads along a
+/// row where the lanes are not rods.
+template <class T> constexpr int width = sizeof(T) == sizeof(double) ? 16 : band_width + 1;
+constexpr int diagonal_place = band_width;
+
+template <class T> T *as(double *p) { return reinterpret_cast<T *>(p); }
 
 /// Pivot of a row with its sign counted. What rounding has left of a diagonal is no pivot.
-double BandedCholesky::pivot(PetscInt row) {
-  double d = band_[std::size_t(row) * width];
-  const double scale = std::abs(diagonal_[row]);
-  if (std::abs(d) <= 16 * std::numeric_limits<double>::epsilon() * scale || d == 0) {
-    ++neutral_;
-    d = scale > 0 ? 1e-6 * scale : 1;
-    band_[std::size_t(row) * width] = d;
-  } else if (d < 0)
-    ++negative_;
-  return d;
+template <class T> T countedPivot(const T &d, const T &diagonal, T &negative, T &neutral) {
+  using std::abs;
+  const T scale = abs(diagonal);
+  const auto lost = abs(d) <= T(16 * std::numeric_limits<double>::epsilon()) * scale;
+  neutral += select(lost, T(1.0), T(0.0));
+  negative += select(!lost && d < T(0.0), T(1.0), T(0.0));
+  return select(lost, select(scale > T(0.0), T(1e-6) * scale, T(1.0)), d);
 }
 
-/// Right-looking elimination of one block: each row updates the ten below it, and for a ring the border.
-void BandedCholesky::eliminate(const Block &block, std::vector<double> &far) {
-  const PetscInt size = block.end - block.begin, first_border = block.end - block.border;
-  for (PetscInt j = block.begin; j < block.end; ++j) {
-    double *row = &band_[std::size_t(j) * width];
-    const double inverse = 1 / pivot(j);
-    double l[half_band + 1];
-    for (int r = 1; r <= half_band; ++r) l[r] = row[r] * inverse;
+/// Right-looking elimination: each row updates the ten below it, and for a ring the border.
+/// \param far rows x border couplings beyond the band, or null
+template <class T> void eliminate(T *band, T *far, int rows, T &negative, T &neutral) {
+  constexpr int w = width<T>;
+  const int first_border = rows - border;
+  T u[band_width + 8], l[band_width];
+  for (T &v : u) v = T(0.0);
+  for (int j = 0; j < rows; ++j) {
+    T *row = band + std::size_t(j) * w;
+    const T inverse = T(1.0) / countedPivot(row[0], row[diagonal_place], negative, neutral);
     for (int r = 1; r <= half_band; ++r) {
-      double *below = row + std::size_t(r) * width;
-      for (int c = 0; c <= half_band - r; ++c) below[c] -= l[r] * row[r + c];
+      u[r] = row[r];
+      l[r] = u[r] * inverse;
+    }
+    for (int r = 1; r <= half_band; ++r) {
+      T *below = row + r * w;
+      if constexpr (std::is_same_v<T, double>) {
+        for (int c = 0; c < 8; ++c) below[c] -= l[r] * u[r + c]; // whole registers: what lies beyond the band is zero
+        for (int c = 8; c <= half_band - r; ++c) below[c] -= l[r] * u[r + c];
+      } else
+        for (int c = 0; c <= half_band - r; ++c) below[c] -= l[r] * u[r + c];
     }
     // Border rows beyond the band of row j: they meet the rows within it, and each other.
-    for (int q = 0; q < block.border; ++q) {
-      const PetscInt i = first_border + q;
+    for (int q = 0; far && q < border; ++q) {
+      const int i = first_border + q;
       if (i - j <= half_band) continue;
-      double *far_row = &far[std::size_t(q) * size];
-      const double w = far_row[j - block.begin];
-      if (w == 0) continue;
-      const double lq = w * inverse;
-      for (int r = 1; r <= half_band; ++r) {
-        const PetscInt k = j + r;
-        if (k >= i) break;
+      T *column = far + std::size_t(j) * border;
+      const T lq = column[q] * inverse;
+      for (int r = 1; r <= half_band && j + r < i; ++r) {
+        const int k = j + r;
         if (i - k > half_band)
-          far_row[k - block.begin] -= lq * row[r];
+          far[std::size_t(k) * border + q] -= lq * u[r];
         else
-          band_[std::size_t(k) * width + (i - k)] -= lq * row[r];
+          band[std::size_t(k) * w + (i - k)] -= lq * u[r];
       }
-      for (int p = q; p < block.border; ++p) { // the corner of the border; rows p >= q are also beyond the band
-        const double wp = far[std::size_t(p) * size + (j - block.begin)];
-        band_[std::size_t(i) * width + (p - q)] -= lq * wp;
-      }
-      far_row[j - block.begin] = lq;
+      for (int p = q; p < border; ++p) band[std::size_t(i) * w + (p - q)] -= lq * column[p];
+      column[q] = lq;
     }
+    row[0] = inverse;
     for (int r = 1; r <= half_band; ++r) row[r] = l[r];
   }
 }
 
-void BandedCholesky::solve(const PetscScalar *b, PetscScalar *x) const {
-  if (x != b) std::copy(b, b + rows_, x);
-  for (std::size_t n = 0; n < blocks_.size(); ++n) {
-    const Block &block = blocks_[n];
-    const PetscInt size = block.end - block.begin, first_border = block.end - block.border;
-    auto farRow = [&](int q) { return &far_[n][std::size_t(q) * size]; };
-    for (PetscInt j = block.begin; j < block.end; ++j) {
-      const double *row = &band_[std::size_t(j) * width];
-      const int most = int(std::min<PetscInt>(half_band, block.end - 1 - j));
-      for (int r = 1; r <= most; ++r) x[j + r] -= row[r] * x[j];
-      for (int q = 0; q < block.border; ++q)
-        if (first_border + q - j > half_band) x[first_border + q] -= farRow(q)[j - block.begin] * x[j];
+/// x = A^-1 x; ten rows before and behind the first and last of `band` and `x` are zero.
+template <class T> void substitute(const T *band, const T *far, int rows, T *x) {
+  constexpr int w = width<T>;
+  const int first_border = rows - border;
+  for (int j = 0; j < rows; ++j) {
+    const T *above = band + std::ptrdiff_t(j - half_band) * w;
+    T even(0.0), odd(0.0); // the nearest last: the others do not wait for it
+    for (int r = half_band; r >= 2; r -= 2) {
+      even += above[(half_band - r) * w + r] * x[j - r];
+      odd += above[(half_band - r + 1) * w + r - 1] * x[j - r + 1];
     }
-    for (PetscInt j = block.end - 1; j >= block.begin; --j) {
-      const double *row = &band_[std::size_t(j) * width];
-      const int most = int(std::min<PetscInt>(half_band, block.end - 1 - j));
-      double sum = x[j] / row[0];
-      for (int r = 1; r <= most; ++r) sum -= row[r] * x[j + r];
-      for (int q = 0; q < block.border; ++q)
-        if (first_border + q - j > half_band) sum -= farRow(q)[j - block.begin] * x[first_border + q];
-      x[j] = sum;
+    T value = x[j] - (even + odd);
+    if (far && j >= first_border)
+      for (int k = 0; j - k > half_band; ++k) value -= far[std::size_t(k) * border + (j - first_border)] * x[k];
+    x[j] = value;
+  }
+  for (int j = rows - 1; j >= 0; --j) {
+    const T *row = band + std::size_t(j) * w;
+    T even(0.0), odd(0.0);
+    for (int r = half_band; r >= 2; r -= 2) {
+      even += row[r] * x[j + r];
+      odd += row[r - 1] * x[j + r - 1];
+    }
+    T value = x[j] * row[0] - (even + odd);
+    for (int q = 0; far && q < border; ++q)
+      if (first_border + q - j > half_band) value -= far[std::size_t(j) * border + q] * x[first_border + q];
+    x[j] = value;
+  }
+}
+
+} // namespace
+
+BandedFactor::BandedFactor(const DofMap &dofs) : dofs_(dofs), order_(dofs.rods().size()), fixed_(order_.size()), negative_(order_.size(), 0), neutral_(order_.size(), 0) {
+  const auto &rods = dofs.rods();
+  auto shape = [&](int r) { return std::pair(rods[r].vertices, rods[r].closed); };
+  std::iota(order_.begin(), order_.end(), 0);
+  std::stable_sort(order_.begin(), order_.end(), [&](int a, int b) { return shape(a) < shape(b); });
+  for (std::size_t r = 0; r < rods.size(); ++r)
+    for (int i = 0; i < rods[r].vertices; ++i)
+      for (int a = 0; a < slot_size; ++a)
+        if (dofs.unknown(rods[r].slot(i), a) < 0) fixed_[r].push_back(slot_size * i + a);
+  plan(std::vector<char>(rods.size(), true)); // no smaller set of rods needs more room
+  std::size_t band = 0, far = 0, rows = 0;
+  for (const Group &g : groups_) {
+    const std::size_t n = std::size_t(slot_size) * rods[g.rod[0]].vertices + 2 * half_band;
+    band = g.band + n * (g.packed ? width<Pack> * lanes : width<double>);
+    far = std::max(far, g.far + n * border * (g.packed ? lanes : 1));
+    rows = std::max(rows, n * (g.packed ? lanes : 1));
+  }
+  band_.assign(band, 0.0);
+  far_.assign(far, 0.0);
+  rows_.assign(rows, 0.0);
+}
+
+/// Groups of the wanted rods of each shape: whole packs; of the rest, a pack when that is cheaper than one after the other.
+void BandedFactor::plan(const std::vector<char> &wanted) {
+  constexpr int worth_a_pack = 3;
+  const auto &rods = dofs_.rods();
+  groups_.clear();
+  std::size_t band = 0, far = 0;
+  auto close = [&](Group group, bool packed) {
+    const RodRange &rod = rods[group.rod[0]];
+    const std::size_t n = std::size_t(slot_size) * rod.vertices + 2 * half_band;
+    group.packed = packed;
+    group.band = band;
+    group.far = far;
+    band += n * (packed ? width<Pack> * lanes : width<double>);
+    if (rod.closed) far += n * border * (packed ? lanes : 1);
+    groups_.push_back(group);
+  };
+  Group open{};
+  auto flush = [&] {
+    if (open.count >= worth_a_pack) {
+      for (int l = open.count; l < lanes; ++l) open.rod[l] = open.rod[0];
+      close(open, true);
+    } else
+      for (int l = 0; l < open.count; ++l) {
+        Group one{};
+        one.rod[0] = open.rod[l];
+        one.count = 1;
+        close(one, false);
+      }
+    open.count = 0;
+  };
+  for (const int r : order_) {
+    if (!wanted[r]) continue;
+    const RodRange &rod = rods[r];
+    if (open.count == lanes || (open.count > 0 && (rods[open.rod[0]].vertices != rod.vertices || rods[open.rod[0]].closed != rod.closed))) flush();
+    open.rod[open.count++] = r;
+  }
+  flush();
+}
+
+void BandedFactor::factor(const BandedSystem &system) {
+  plan(system.wanted);
+  for (const Group &group : groups_)
+    if (group.packed)
+      factorGroup<Pack>(group, system);
+    else
+      factorGroup<double>(group, system);
+}
+
+template <class T> void BandedFactor::factorGroup(const Group &group, const BandedSystem &system) {
+  constexpr int w = width<T>, tile = 16;
+  const RodRange &first = dofs_.rods()[group.rod[0]];
+  const int n = first.vertices, rows = slot_size * n;
+  T *band = as<T>(&band_[group.band]) + half_band * w;
+  T *far = first.closed ? as<T>(&far_[group.far]) : nullptr;
+  std::fill(band - half_band * w, band, T(0.0));
+  std::fill(band + std::size_t(rows) * w, band + std::size_t(rows + half_band) * w, T(0.0));
+  std::array<const double *, lanes> source{};
+  for (int l = 0; l < (group.packed ? lanes : 1); ++l) source[l] = system.band->entry(dofs_.rods()[group.rod[l]], 0, 0);
+  auto entry = [&](int a, int k, int i) {
+    const std::size_t at = std::size_t(a * band_width + k) * first.slots + i;
+    if constexpr (std::is_same_v<T, Pack>)
+      return Pack([&](auto lane) { return source[lane][at]; });
+    else
+      return source[0][at];
+  };
+  for (int begin = 0; begin < n; begin += tile)
+    for (int a = 0; a < slot_size; ++a)
+      for (int k = 0; k < band_width; ++k)
+        for (int i = begin; i < std::min(begin + tile, n); ++i) band[std::size_t(slot_size * i + a) * w + k] = entry(a, k, i);
+  if (far) { // couplings of the last two slots to the first: beyond the band unless the ring is very small
+    std::fill(far, far + std::size_t(rows) * border, T(0.0));
+    for (int i = n - 2; i < n; ++i)
+      for (int a = 0; a < slot_size; ++a)
+        for (int k = std::max(0, rows - slot_size * i - a); k < band_width; ++k) {
+          const int p = slot_size * i + a, q = p + k - rows;
+          T &own = band[std::size_t(p) * w + k];
+          if (p - q > half_band)
+            far[std::size_t(q) * border + (p - (rows - border))] += own;
+          else
+            band[std::size_t(q) * w + (p - q)] += own;
+          own = T(0.0);
+        }
+  }
+  for (int l = 0; l < group.count; ++l) {
+    const int r = group.rod[l];
+    const RodRange &rod = dofs_.rods()[r];
+    auto set = [&](T &value, double v) {
+      if constexpr (std::is_same_v<T, Pack>)
+        value[l] = v;
+      else
+        value = v;
+    };
+    if (system.shift[r] != 0)
+      for (int row = 0; row < rows; ++row) {
+        T &d = band[std::size_t(row) * w];
+        const double shift = system.shift[r] * (*system.metric)[row % slot_size][rod.slot(row / slot_size)];
+        if constexpr (std::is_same_v<T, Pack>)
+          d[l] = d[l] + shift;
+        else
+          d += shift;
+      }
+    for (const int row : fixed_[r]) {
+      set(band[std::size_t(row) * w], 1);
+      for (int k = 1; k <= half_band; ++k) {
+        set(band[std::size_t(row) * w + k], 0);
+        if (row >= k) set(band[std::size_t(row - k) * w + k], 0);
+      }
+      if (!far) continue;
+      for (int q = 0; q < border; ++q) {
+        set(far[std::size_t(row) * border + q], 0);
+        if (row == rows - border + q)
+          for (int j = 0; j < rows; ++j) set(far[std::size_t(j) * border + q], 0);
+      }
     }
   }
+  for (int row = 0; row < rows; ++row) band[std::size_t(row) * w + diagonal_place] = band[std::size_t(row) * w];
+  T negative(0.0), neutral(0.0);
+  eliminate(band, far, rows, negative, neutral);
+  for (int l = 0; l < group.count; ++l)
+    if constexpr (std::is_same_v<T, Pack>) {
+      negative_[group.rod[l]] = int(negative[l]);
+      neutral_[group.rod[l]] = int(neutral[l]);
+    } else {
+      negative_[group.rod[l]] = int(negative);
+      neutral_[group.rod[l]] = int(neutral);
+    }
+}
+
+void BandedFactor::solve(const PetscScalar *b, PetscScalar *x) {
+  if (x != b) std::copy(b, b + dofs_.unknowns(), x);
+  std::vector<char> solved(order_.size(), false);
+  for (const Group &group : groups_) {
+    if (group.packed)
+      solveGroup<Pack>(group, b, x);
+    else
+      solveGroup<double>(group, b, x);
+    for (int l = 0; l < group.count; ++l) solved[group.rod[l]] = true;
+  }
+  for (std::size_t r = 0; r < solved.size(); ++r)
+    if (!solved[r])
+      for (int s = dofs_.rods()[r].first_slot; s < dofs_.rods()[r].vertexEnd(); ++s)
+        for (int a = 0; a < slot_size; ++a)
+          if (dofs_.unknown(s, a) >= 0) x[dofs_.unknown(s, a)] = 0;
+}
+
+template <class T> void BandedFactor::solveGroup(const Group &group, const PetscScalar *b, PetscScalar *x) {
+  constexpr int step = sizeof(T) / sizeof(double);
+  const RodRange &first = dofs_.rods()[group.rod[0]];
+  const int rows = slot_size * first.vertices;
+  const T *band = as<T>(&band_[group.band]) + half_band * width<T>;
+  const T *far = first.closed ? as<T>(&far_[group.far]) : nullptr;
+  double *values = rows_.data() + half_band * step;
+  std::fill(values - half_band * step, values, 0.0);
+  std::fill(values + std::size_t(rows) * step, values + std::size_t(rows + half_band) * step, 0.0);
+  auto eachUnknown = [&](auto visit) {
+    for (int l = 0; l < group.count; ++l) {
+      const RodRange &rod = dofs_.rods()[group.rod[l]];
+      for (int i = 0, row = 0; i < rod.vertices; ++i)
+        for (int a = 0; a < slot_size; ++a, ++row) visit(dofs_.unknown(rod.slot(i), a), values[std::size_t(row) * step + l]);
+    }
+  };
+  eachUnknown([&](PetscInt u, double &value) { value = u >= 0 ? b[u] : 0.0; });
+  substitute<T>(band, far, rows, as<T>(values));
+  eachUnknown([&](PetscInt u, const double &value) {
+    if (u >= 0) x[u] = value;
+  });
 }
 
 namespace {
 
 constexpr const char *name = "banded";
 
+BandedFactor *factorOf(Mat f) { return static_cast<BandedFactor *>(f->data); }
+
 PetscErrorCode numeric(Mat f, Mat a, const MatFactorInfo *) {
-  PetscInt n;
-  const PetscInt *ia, *ja;
-  const PetscScalar *values;
-  PetscBool done;
+  BandedSystem *system;
   PetscFunctionBegin;
-  auto *factor = static_cast<BandedCholesky *>(f->data);
-  PetscCall(MatGetRowIJ(a, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
-  PetscCall(MatSeqAIJGetArrayRead(a, &values));
-  factor->factor(ia, ja, values);
-  PetscCall(MatSeqAIJRestoreArrayRead(a, &values));
-  PetscCall(MatRestoreRowIJ(a, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  PetscCall(MatShellGetContext(a, &system));
+  factorOf(f)->factor(*system);
   f->assembled = PETSC_TRUE;
   PetscFunctionReturn(0);
 }
@@ -154,38 +316,35 @@ PetscErrorCode solveVec(Mat f, Vec b, Vec x) {
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(b, &right));
   PetscCall(VecGetArrayWrite(x, &out));
-  static_cast<BandedCholesky *>(f->data)->solve(right, out);
+  factorOf(f)->solve(right, out);
   PetscCall(VecRestoreArrayWrite(x, &out));
   PetscCall(VecRestoreArrayRead(b, &right));
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode inertia(Mat f, PetscInt *negative, PetscInt *zero, PetscInt *positive) {
+  PetscInt minus = 0, none = 0;
   PetscFunctionBegin;
-  const auto *factor = static_cast<BandedCholesky *>(f->data);
-  if (negative) *negative = factor->negativePivots();
-  if (zero) *zero = factor->neutralPivots();
-  if (positive) *positive = f->rmap->n - factor->negativePivots() - factor->neutralPivots();
+  for (int r = 0; r < factorOf(f)->rods(); ++r) {
+    minus += factorOf(f)->negativePivots(r);
+    none += factorOf(f)->neutralPivots(r);
+  }
+  if (negative) *negative = minus;
+  if (zero) *zero = none;
+  if (positive) *positive = f->rmap->n - minus - none;
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode getInfo(Mat f, MatInfoType, MatInfo *info) {
   PetscFunctionBegin;
   *info = {};
-  info->nz_used = info->nz_allocated = double(f->rmap->n) * (BandedCholesky::half_band + 1);
+  info->nz_used = info->nz_allocated = double(f->rmap->n) * band_width;
+  info->memory = double(factorOf(f)->bytes());
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode symbolic(Mat f, Mat a, IS, const MatFactorInfo *) {
-  PetscInt n;
-  const PetscInt *ia, *ja;
-  PetscBool done;
+PetscErrorCode symbolic(Mat f, Mat, IS, const MatFactorInfo *) {
   PetscFunctionBegin;
-  PetscCall(MatGetRowIJ(a, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
-  const bool fits = static_cast<BandedCholesky *>(f->data)->analyse(n, ia, ja);
-  PetscCall(MatRestoreRowIJ(a, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
-  PetscCheck(fits, PetscObjectComm((PetscObject)a), PETSC_ERR_USER_INPUT,
-             "solver type banded needs a scene of chains and rings; use -pc_factor_mat_solver_type petsc or mumps");
   f->ops->choleskyfactornumeric = numeric;
   f->ops->solve = solveVec;
   f->ops->getinertia = inertia;
@@ -194,7 +353,7 @@ PetscErrorCode symbolic(Mat f, Mat a, IS, const MatFactorInfo *) {
 
 PetscErrorCode destroy(Mat f) {
   PetscFunctionBegin;
-  delete static_cast<BandedCholesky *>(f->data);
+  delete factorOf(f);
   f->data = nullptr;
   PetscCall(PetscObjectComposeFunction((PetscObject)f, "MatFactorGetSolverType_C", nullptr));
   PetscFunctionReturn(0);
@@ -208,12 +367,14 @@ PetscErrorCode solverType(Mat, MatSolverType *type) {
 
 PetscErrorCode create(Mat a, MatFactorType, Mat *out) {
   Mat f;
+  BandedSystem *system;
   PetscFunctionBegin;
+  PetscCall(MatShellGetContext(a, &system));
   PetscCall(MatCreate(PetscObjectComm((PetscObject)a), &f));
   PetscCall(MatSetSizes(f, a->rmap->n, a->cmap->n, a->rmap->N, a->cmap->N));
   PetscCall(PetscStrallocpy(name, &((PetscObject)f)->type_name));
   PetscCall(MatSetUp(f));
-  f->data = new BandedCholesky;
+  f->data = new BandedFactor(*system->dofs);
   f->ops->choleskyfactorsymbolic = symbolic;
   f->ops->getinfo = getInfo;
   f->ops->destroy = destroy;
@@ -228,11 +389,41 @@ PetscErrorCode create(Mat a, MatFactorType, Mat *out) {
   PetscFunctionReturn(0);
 }
 
+PetscErrorCode multiply(Mat a, Vec x, Vec y) {
+  BandedSystem *system;
+  PetscFunctionBegin;
+  PetscCall(MatShellGetContext(a, &system));
+  const DofMap &dofs = *system->dofs;
+  Planes in = dofs.makePlanes(), out = dofs.makePlanes();
+  PetscCall(dofs.scatter(x, in));
+  for (std::size_t r = 0; r < dofs.rods().size(); ++r) {
+    const RodRange &rod = dofs.rods()[r];
+    system->band->multiply(rod, in, out);
+    dofs.fold(rod, out);
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
+      for (int k = 0; k < slot_size; ++k) out[k][s] += system->shift[r] * (*system->metric)[k][s] * in[k][s];
+  }
+  PetscCall(dofs.gather(out, y));
+  PetscFunctionReturn(0);
+}
+
 } // namespace
+
+PetscErrorCode createBandedMatrix(BandedSystem *system, Mat *matrix) {
+  PetscFunctionBeginUser;
+  const PetscInt n = system->dofs->unknowns();
+  PetscCall(MatCreateShell(PETSC_COMM_WORLD, n, n, PETSC_DETERMINE, PETSC_DETERMINE, system, matrix));
+  PetscCall(MatShellSetOperation(*matrix, MATOP_MULT, (void (*)(void))multiply));
+  PetscCall(MatSetOption(*matrix, MAT_SYMMETRIC, PETSC_TRUE));
+  PetscCall(MatSetOption(*matrix, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
+  PetscFunctionReturn(0);
+}
+
+const BandedFactor *bandedFactorOf(Mat factored) { return factored->ops->choleskyfactornumeric == numeric ? factorOf(factored) : nullptr; }
 
 PetscErrorCode registerBanded() {
   PetscFunctionBeginUser;
-  PetscCall(MatSolverTypeRegister(name, MATSEQAIJ, MAT_FACTOR_CHOLESKY, create));
+  PetscCall(MatSolverTypeRegister(name, MATSHELL, MAT_FACTOR_CHOLESKY, create));
   PetscFunctionReturn(0);
 }
 

@@ -5,171 +5,205 @@
 namespace tendril {
 namespace {
 
-/// Whether two edges folded by more than a right angle are on the other side of 180 degrees afterwards: their binormal, seen from the first edge's
-/// frame, has turned round.
-bool crossesFold(const Frame &a0, const Frame &b0, const Frame &a1, const Frame &b1) {
-  if (a0.tangent.dot(b0.tangent) > 0 || a1.tangent.dot(b1.tangent) > 0) return false;
-  const Vec3 before = a0.tangent.cross(b0.tangent), after = a1.tangent.cross(b1.tangent);
-  return before.dot(a0.director) * after.dot(a1.director) + before.dot(a0.secondDirector()) * after.dot(a1.secondDirector()) < 0;
+using C = Configuration;
+
+/// Lanes in which two edges folded by more than a right angle are on the other side of 180 degrees afterwards: their binormal, seen from the
+/// first edge's frame, has turned round.
+template <class T> auto crossesFold(const std::array<FrameOf<T>, 2> &before, const std::array<FrameOf<T>, 2> &after) {
+  auto binormal = [](const std::array<FrameOf<T>, 2> &f) {
+    const Vector3<T> b = f[0].tangent.cross(f[1].tangent);
+    return std::array<T, 2>{b.dot(f[0].director), b.dot(f[0].secondDirector())};
+  };
+  const auto folded = before[0].tangent.dot(before[1].tangent) <= T(0.0) && after[0].tangent.dot(after[1].tangent) <= T(0.0);
+  const std::array<T, 2> b0 = binormal(before), b1 = binormal(after);
+  return folded && b0[0] * b1[0] + b0[1] * b1[1] < T(0.0);
 }
+
+bool anyLane(bool b) { return b; }
+bool anyLane(const Pack::mask_type &m) { return any_of(m); }
 
 } // namespace
 
-Retraction::Retraction(const Elements &elements, const DofMap &dofs) : elements_(elements) {
-  held_.resize(dofs.vertices());
-  for (int v = 0; v < dofs.vertices(); ++v) held_[v] = dofs.isHeld(v);
-  setInverseTimeSquared(0);
-}
+Retraction::Retraction(const Elements &elements, const DofMap &) : elements_(elements), work_(work_planes, elements.slots) { setInverseTimeSquared(0); }
 
 void Retraction::setInverseTimeSquared(double value) {
+  if (value == inverse_time_squared_) return;
   inverse_time_squared_ = value;
-  softness_.assign(held_.size(), 0.0);
-  for (std::size_t i = 0; i < elements_.vertex0.size(); ++i)
-    for (const int v : {elements_.vertex0[i], elements_.vertex1[i]})
-      softness_[v] += 1e-8 * elements_.axial_stiffness[i] * elements_.inverse_rest_length[i]; // a floor for rods without mass
-  for (std::size_t v = 0; v < held_.size(); ++v) softness_[v] = held_[v] ? 0.0 : 1 / (softness_[v] + elements_.mass[v] * value);
+  double *soft = work_[softness];
+  for (const RodRange &rod : elements_.rods) {
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) soft[s] = 0;
+    for (int i = 0; i < rod.edges; ++i) // a floor for rods without mass
+      for (const int v : {i, (i + 1) % rod.vertices}) soft[rod.slot(v)] += 1e-8 * elements_.axialStiffness()[rod.slot(i)] * elements_.inverseRestLength()[rod.slot(i)];
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) soft[s] = elements_.freedom()[s] / (soft[s] + elements_.mass()[s] * value);
+  }
 }
 
-bool Retraction::apply(const Configuration &from, const std::vector<double> &increment, double scale, int r, Configuration &to) {
+bool Retraction::apply(const C &from, const Planes &increment, double scale, int r, RetractionKind kind, C &to) {
   const RodRange &rod = elements_.rods[r];
-  for (int v = rod.first_vertex; v < rod.first_vertex + rod.vertices; ++v)
-    to.position[v] = from.position[v] + scale * Eigen::Map<const Vec3>(&increment[elements_.vertex_row[v]]);
-  if (kind == RetractionKind::length && !restoreLengths(from, r, to.position)) return false;
+  for (int a = 0; a < 3; ++a)
+    for (int s = rod.first_slot; s < rod.vertexEnd() + (rod.closed ? 2 : 0); s += lanes)
+      write(to[C::Plane(C::position + a)] + s, Pack(read<Pack>(from[C::Plane(C::position + a)] + s) + Pack(scale) * read<Pack>(increment[a] + s)));
+  if (kind != RetractionKind::additive && !restoreLengths(from, r, kind, to)) return false;
   return updateFrames(from, increment, scale, r, to);
 }
 
 /// Replaces the additive positions of a rod: chains where an end is free, corrections between held vertices and around rings.
-bool Retraction::restoreLengths(const Configuration &from, int r, std::vector<Vec3> &x) {
+[[gnu::flatten]] bool Retraction::restoreLengths(const C &from, int r, RetractionKind kind, C &to) {
+  using std::sqrt;
   const RodRange &rod = elements_.rods[r];
-  target_.resize(rod.edges);
-  direction_.resize(rod.edges);
-  for (int i = 0; i < rod.edges; ++i) {
-    const int e = rod.first_edge + i;
-    const Vec3 edge = x[elements_.vertex1[e]] - x[elements_.vertex0[e]]; // e + scale de
-    const Frame &before = from.frame[e];
-    target_[i] = before.tangent.dot(edge);
-    if (continues) target_[i] -= (edge - before.length * before.tangent).squaredNorm() / (2 * before.length);
-    const double length = edge.norm();
-    if (!(target_[i] > 0) || !(length > 0)) return false;
-    direction_[i] = edge / length;
+  double *wanted = work_[target];
+  for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
+    const Vector3<Pack> edge = to.positions<Pack>(s + 1) - to.positions<Pack>(s); // e + scale de
+    const FrameOf<Pack> before = from.frames<Pack>(s);
+    Pack want = before.tangent.dot(edge);
+    if (kind == RetractionKind::continued) want -= (edge - before.tangent * before.length).squaredNorm() / (Pack(2.0) * before.length);
+    const Pack length = sqrt(edge.squaredNorm());
+    if (any_of(!(want > Pack(0.0) && length > Pack(0.0)) && firstLanes(rod.edgeEnd() - s))) return false;
+    write(wanted + s, want);
+    writeVector<Pack>(work_, direction, s, edge / length);
   }
-  const int v0 = rod.first_vertex;
-  int first = -1, last = -1; // held vertices of the rod
-  for (int v = 0; v < rod.vertices; ++v)
-    if (held_[v0 + v]) {
-      if (first < 0) first = v;
-      last = v;
-    }
+  std::array<double *, 3> x, d;
+  for (int a = 0; a < 3; ++a) {
+    x[a] = to[C::Plane(C::position + a)];
+    d[a] = work_[direction + a];
+  }
   if (rod.closed) {
-    projectSpan(r, 0, rod.vertices, x);
+    projectSpan(rod, rod.first_slot, rod.edgeEnd(), to);
     return true;
   }
+  auto step = [&](int at, int edge, int next, double sign) {
+    for (int a = 0; a < 3; ++a) x[a][next] = x[a][at] + sign * wanted[edge] * d[a][edge];
+  };
+  const double *freedom = elements_.freedom();
+  int first = -1, last = -1; // held vertices of the rod
+  for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
+    if (freedom[s] == 0) {
+      if (first < 0) first = s;
+      last = s;
+    }
   if (first < 0) { // a free rod keeps the mass-weighted mean of the additive update
+    const double *mass = elements_.mass();
     Vec3 before = Vec3::Zero(), after = Vec3::Zero();
-    double mass = 0;
+    double total = 0;
     auto mean = [&](Vec3 &sum) {
-      for (int v = 0; v < rod.vertices; ++v) sum += elements_.mass[v0 + v] * x[v0 + v];
+      for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) sum += mass[s] * to.positionAt(s);
     };
     mean(before);
-    for (int v = 0; v + 1 < rod.vertices; ++v) x[v0 + v + 1] = x[v0 + v] + target_[v] * direction_[v];
+    for (int s = rod.first_slot; s < rod.edgeEnd(); ++s) step(s, s, s + 1, 1);
     mean(after);
-    for (int v = 0; v < rod.vertices; ++v) mass += elements_.mass[v0 + v];
-    if (mass > 0)
-      for (int v = 0; v < rod.vertices; ++v) x[v0 + v] += (before - after) / mass;
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) total += mass[s];
+    if (total > 0)
+      for (int a = 0; a < 3; ++a)
+        for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) x[a][s] += (before[a] - after[a]) / total;
     return true;
   }
-  for (int v = first; v > 0; --v) x[v0 + v - 1] = x[v0 + v] - target_[v - 1] * direction_[v - 1];
-  for (int v = last; v + 1 < rod.vertices; ++v) x[v0 + v + 1] = x[v0 + v] + target_[v] * direction_[v];
-  for (int v = first; v < last;) {
-    int end = v + 1;
-    while (!held_[v0 + end]) ++end;
-    if (end > v + 1) projectSpan(r, v, end, x);
-    v = end;
+  for (int s = first; s > rod.first_slot; --s) step(s, s - 1, s - 1, -1);
+  for (int s = last; s + 1 < rod.vertexEnd(); ++s) step(s, s, s + 1, 1);
+  for (int s = first; s < last;) {
+    int end = s + 1;
+    while (freedom[end] != 0) ++end;
+    if (end > s + 1) projectSpan(rod, s, end, to);
+    s = end;
   }
   return true;
 }
 
-/// Two Newton sweeps that move the vertices between `first` and `last` the least, in the norm of the softness, towards the target lengths.
-/// The compliance of the edges keeps the system regular where the lengths cannot be met. A closed rod is one span whose last edge
+/// Two Newton sweeps that move the vertices between the slots `first` and `last` the least, in the norm of the softness, towards the target
+/// lengths. The compliance of the edges keeps the system regular where the lengths cannot be met. A closed rod is one span whose last edge
 /// meets its first; the corner of its cyclic system enters as a rank-one change (Sherman and Morrison 1950).
-void Retraction::projectSpan(int r, int first, int last, std::vector<Vec3> &x) {
-  const RodRange &rod = elements_.rods[r];
-  const int n = last - first;
-  diagonal_.resize(n);
-  upper_.resize(n);
-  right_.resize(2 * n);
-  auto edge = [&](int k) { return rod.first_edge + first + k; };
+[[gnu::flatten]] void Retraction::projectSpan(const RodRange &rod, int first, int last, C &to) {
+  using std::sqrt;
+  double *soft = work_[softness], *diag = work_[diagonal], *up = work_[upper], *rhs = work_[right], *z = work_[corner];
+  const int end = last - 1;
   for (int sweep = 0; sweep < 2; ++sweep) {
-    for (int k = 0; k < n; ++k) {
-      const int a = elements_.vertex0[edge(k)], b = elements_.vertex1[edge(k)];
-      const Vec3 e = x[b] - x[a];
-      const double length = e.norm();
-      direction_[k] = e / length;
-      right_[k] = length - target_[first + k];
-      right_[n + k] = 0;
-      diagonal_[k] = softness_[a] + softness_[b] + elements_.rest_length[edge(k)] / elements_.axial_stiffness[edge(k)];
-    }
-    for (int k = 0; k + 1 < n; ++k) upper_[k] = -softness_[elements_.vertex1[edge(k)]] * direction_[k].dot(direction_[k + 1]);
-    double corner = 0, gamma = 0;
     if (rod.closed) {
-      corner = -softness_[elements_.vertex0[edge(0)]] * direction_[0].dot(direction_[n - 1]);
-      gamma = -diagonal_[0];
-      diagonal_[0] -= gamma;
-      diagonal_[n - 1] -= corner * corner / gamma;
-      right_[n] = gamma;
-      right_[2 * n - 1] = corner;
+      to.closeRing(rod);
+      soft[last] = soft[first];
     }
-    for (int k = 1; k < n; ++k) {
-      const double factor = upper_[k - 1] / diagonal_[k - 1];
-      diagonal_[k] -= factor * upper_[k - 1];
-      right_[k] -= factor * right_[k - 1];
-      right_[n + k] -= factor * right_[n + k - 1];
+    for (int s = first; s < last; s += lanes) {
+      const Pack::mask_type live = firstLanes(last - s);
+      const Vector3<Pack> e = to.positions<Pack>(s + 1) - to.positions<Pack>(s);
+      const Pack length = sqrt(e.squaredNorm());
+      for (int a = 0; a < 3; ++a) write(work_[direction + a] + s, select(live, Pack(e[a] / length), Pack(0.0)));
+      write(rhs + s, select(live, Pack(length - read<Pack>(work_[target] + s)), Pack(0.0)));
+      const Pack compliance = read<Pack>(elements_.restLength() + s) / read<Pack>(elements_.axialStiffness() + s);
+      write(diag + s, select(live, Pack(read<Pack>(soft + s) + read<Pack>(soft + s + 1) + compliance), Pack(1.0)));
     }
-    for (int k = n - 1; k >= 0; --k)
-      for (double *y : {&right_[0], &right_[n]}) y[k] = (y[k] - (k + 1 < n ? upper_[k] * y[k + 1] : 0.0)) / diagonal_[k];
+    for (int s = first; s < end; s += lanes)
+      write(up + s, Pack(-read<Pack>(soft + s + 1) * readVector<Pack>(work_, direction, s).dot(readVector<Pack>(work_, direction, s + 1))));
+    double cyclic = 0, gamma = 0;
     if (rod.closed) {
-      const double *z = &right_[n];
-      const double factor = (right_[0] + corner / gamma * right_[n - 1]) / (1 + z[0] + corner / gamma * z[n - 1]);
-      for (int k = 0; k < n; ++k) right_[k] -= factor * z[k];
+      cyclic = -soft[first] * work_.vector(direction, first).dot(work_.vector(direction, end));
+      gamma = -diag[first];
+      diag[first] -= gamma;
+      diag[end] -= cyclic * cyclic / gamma;
+      std::fill(z + first, z + last, 0.0);
+      z[first] = gamma;
+      z[end] = cyclic;
     }
-    for (int k = 0; k < n; ++k) {
-      const int a = elements_.vertex0[edge(k)], b = elements_.vertex1[edge(k)];
-      x[a] += softness_[a] * right_[k] * direction_[k];
-      x[b] -= softness_[b] * right_[k] * direction_[k];
+    auto solve = [&](double *y) {
+      for (int s = first + 1; s < last; ++s) y[s] -= up[s - 1] * diag[s - 1] * y[s - 1];
+      for (int s = end; s >= first; --s) y[s] = (s < end ? y[s] - up[s] * y[s + 1] : y[s]) * diag[s];
+    };
+    diag[first] = 1 / diag[first]; // inverse pivots from here on
+    for (int s = first + 1; s < last; ++s) diag[s] = 1 / (diag[s] - up[s - 1] * up[s - 1] * diag[s - 1]);
+    solve(rhs);
+    if (rod.closed) {
+      solve(z);
+      const double factor = (rhs[first] + cyclic / gamma * rhs[end]) / (1 + z[first] + cyclic / gamma * z[end]);
+      for (int s = first; s < last; ++s) rhs[s] -= factor * z[s];
+    }
+    for (int a = 0; a < 3; ++a) {
+      double *x = to[C::Plane(C::position + a)], *d = work_[direction + a];
+      for (int s = first; s < last; ++s) d[s] *= rhs[s];
+      for (int s = last - 1; s > first; --s) x[s] += soft[s] * (d[s] - d[s - 1]);
+      x[first] += soft[first] * (d[first] - (rod.closed ? d[end] : 0.0));
+      if (!rod.closed) x[last] -= soft[last] * d[end];
     }
   }
+  if (rod.closed) to.closeRing(rod);
 }
 
-bool Retraction::updateFrames(const Configuration &from, const std::vector<double> &increment, double scale, int r, Configuration &to) const {
+[[gnu::flatten]] bool Retraction::updateFrames(const C &from, const Planes &increment, double scale, int r, C &to) const {
+  using std::floor, std::sqrt;
   const RodRange &rod = elements_.rods[r];
-  const bool twist = rod.stride == 4;
-  for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
-    const Vec3 e = to.position[elements_.vertex1[i]] - to.position[elements_.vertex0[i]];
-    const double length = e.norm();
-    const Frame &f = from.frame[i];
-    const Vec3 t = e / length;
-    if (!(length > 0) || !(1 + f.tangent.dot(t) > 1e-8)) return false;
-    const double angle = twist ? scale * increment[elements_.edge_row[i] + 3] : 0.0;
-    Vec3 director = transport<double>(f.director, f.tangent, t);
-    if (angle != 0) director = rotateAbout<double>(director, t, angle);
-    to.frame[i] = {t, director, length};
-    to.strain[i] = axialStrain(length, elements_.inverse_rest_length[i]);
-    to.spin[i] = from.spin[i] + angle;
+  for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
+    const Pack::mask_type live = firstLanes(rod.edgeEnd() - s);
+    const Vector3<Pack> e = to.positions<Pack>(s + 1) - to.positions<Pack>(s);
+    const Pack length = sqrt(e.squaredNorm());
+    const FrameOf<Pack> f = from.frames<Pack>(s);
+    const Vector3<Pack> t = e / length;
+    if (any_of(!(length > Pack(0.0) && Pack(1.0) + f.tangent.dot(t) > Pack(1e-8)) && live)) return false;
+    const Pack angle = Pack(scale) * read<Pack>(increment[3] + s);
+    const Vector3<Pack> director = rotateAbout<Pack>(transport<Pack>(f.director, f.tangent, t), t, angle);
+    for (int a = 0; a < 3; ++a) {
+      write(to[C::Plane(C::tangent + a)] + s, select(live, t[a], f.tangent[a]));
+      write(to[C::Plane(C::director + a)] + s, select(live, director[a], f.director[a]));
+    }
+    const Pack kept = select(live, length, f.length);
+    write(to[C::length] + s, kept);
+    write(to[C::strain] + s, axialStrain<Pack>(kept, read<Pack>(elements_.inverseRestLength() + s)));
+    write(to[C::spin] + s, Pack(read<Pack>(from[C::spin] + s) + angle));
   }
+  to.closeRing(rod);
   // Whole turns of the twist angle by continuity: the angle moves by the difference of the two spins, and by a little holonomy. Half a turn
   // is a barrier of the measure `tan`: no step leads across it.
-  const CellArrays &cells = elements_.cells;
-  const int ne = int(to.spin.size());
-  auto turning = [&](int frame) { return frame < ne ? to.spin[frame] - from.spin[frame] : 0.0; };
-  for (int c = elements_.rod_cells[r]; c < elements_.rod_cells[r + 1]; ++c) {
-    const double expected = from.twist[c] + turning(cells.frame1[c]) - turning(cells.frame0[c]);
-    const double principal = halfAngleBetween(to.frame[cells.frame0[c]], to.frame[cells.frame1[c]]).angle();
-    to.turns[c] = 2 * pi * std::round((expected - principal) / (2 * pi));
-    if (elements_.measure[r] != Measure::tan) continue;
-    if (to.turns[c] != 0 || crossesFold(from.frame[cells.frame0[c]], from.frame[cells.frame1[c]], to.frame[cells.frame0[c]], to.frame[cells.frame1[c]])) return false;
-    to.twist[c] = principal + to.turns[c];
-  }
-  return true;
+  bool possible = true;
+  const bool barrier = elements_.measure[r] == Measure::tan;
+  forCells(elements_, r, [&]<class T>(const LooseCell &cell, int count) {
+    auto turned = [&](int frame) { return T(read<T>(to[C::spin] + frame) - read<T>(from[C::spin] + frame)); };
+    const T expected = read<T>(from[C::twist] + cell.slot) + turned(cell.frame1) - turned(cell.frame0);
+    const auto frames = cellFrames<T>(to, cell, count);
+    const T principal = halfAngleBetween(frames[0], frames[1]).angle();
+    const T turns = T(2 * pi) * floor((expected - principal) * T(0.5 / pi) + T(0.5));
+    write(to[C::turns] + cell.slot, turns);
+    write(to[C::twist] + cell.slot, T(principal + turns));
+    if (!barrier) return;
+    auto crossed = turns != T(0.0) || crossesFold(cellFrames<T>(from, cell, count), frames);
+    if constexpr (std::is_same_v<T, Pack>) crossed = crossed && firstLanes(count);
+    possible = possible && !anyLane(crossed);
+  });
+  return possible;
 }
 
 } // namespace tendril

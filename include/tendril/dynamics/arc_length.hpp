@@ -9,7 +9,7 @@ namespace tendril {
 /// \throws SceneError when the path has another parameter than the load factor (prescribed motions), or no load at all
 void requireDeadLoads(const Scene &scene);
 
-/// Unknowns are the rows q and the load factor. Length along the path, without units:
+/// Unknowns are those of the rods, q, and the load factor. Length along the path, without units:
 ///   ds^2 = mean over vertices of |dx|^2/L^2 + mean over edges of d(theta)^2 + d(factor)^2.
 class ArcLength {
 public:
@@ -25,14 +25,14 @@ public:
 private:
   /// A point relative to the start of the step, or a direction.
   struct Point {
-    std::vector<double> rows;
+    Planes unknowns;
     double factor = 0;
   };
   NewtonSolver &solver_;
   LoopSettings settings_;
   std::unique_ptr<Term> load_; ///< at load factor 1: its gradient is the derivative of the gradient by the load factor
-  std::vector<double> metric_;
-  Rows load_rows_;
+  Planes metric_;
+  Derivatives load_derivatives_;
   Point last_; ///< the last step taken
   Configuration trial_;
   std::string failure_, obstacle_;
@@ -41,9 +41,9 @@ private:
   double product(const Point &a, const Point &b) const;
   PetscErrorCode findStart(State &state);
   PetscErrorCode tangent(Point *direction);
-  PetscErrorCode solveLoad(std::vector<double> *response);
-  PetscErrorCode solveRows(const std::vector<double> &right, std::vector<double> *solution);
-  bool move(const std::vector<double> &increment, double factor);
+  PetscErrorCode solve(const Planes &gradient, Planes *step);
+  PetscErrorCode solveLoad(Planes *response);
+  bool move(const Planes &increment, double factor);
   PetscErrorCode correct(double start, const Point &direction, double length, bool *converged);
   PetscErrorCode correctAt(double factor, bool *converged);
   PetscErrorCode iterate(const std::function<double(const Point &moved, const Point &residual, const Point &load)> &constraint, double start, bool *converged);

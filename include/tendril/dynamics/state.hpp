@@ -24,23 +24,92 @@ struct State {
 
 State initialState(const Scene &scene, const Elements &elements);
 
-/// A point of the configuration manifold with its derived frames: the iterate of a step.
-struct Configuration {
-  std::vector<Vec3> position;
-  std::vector<Frame> frame;        ///< of edges, then of supports
-  /// (ne) axial strain, computed once: compilers contract the formula differently from place to place, and a stiff rod turns that last bit
-  /// into forces.
-  std::vector<double> strain;
-  std::vector<double> spin;        ///< (ne) turning of each director since the step began, summed over retractions [rad]
-  std::vector<double> turns;       ///< as in State
-  std::vector<double> twist;       ///< (cells) twist angle with whole turns [rad]
-  std::vector<double> axial_force; ///< (ne) [N]
+/// A point of the configuration manifold with its derived frames, over slots: the iterate of a step. Whatever is no edge has a unit frame at
+/// rest, so that whole packs can be worked on.
+class Configuration {
+public:
+  /// First planes of what is stored.
+  enum Plane : int {
+    position = 0,
+    tangent = 3,
+    director = 6,
+    length = 9,
+    /// Axial strain, computed once: compilers contract the formula differently from place to place, and a stiff rod turns that last bit into forces.
+    strain = 10,
+    spin = 11,  ///< turning of each director since the step began, summed over retractions [rad]
+    turns = 12, ///< of cells, as in State
+    twist = 13, ///< twist angle of cells with whole turns [rad]
+    axial_force = 14,
+    planes = 15
+  };
+
+  Configuration() = default;
+  explicit Configuration(int slots);
+  double *operator[](Plane plane) { return values_[plane]; }
+  const double *operator[](Plane plane) const { return values_[plane]; }
+
+  const Planes &values() const { return values_; }
+  Vec3 positionAt(int slot) const { return values_.vector(position, slot); }
+  Frame frameAt(int slot) const { return frames<double>(slot); }
+  void setFrame(int slot, const Frame &f);
+  /// Frames of a slot or of a pack of them.
+  template <class T> FrameOf<T> frames(int slot) const {
+    return {readVector<T>(values_, tangent, slot), readVector<T>(values_, director, slot), read<T>((*this)[length] + slot)};
+  }
+  template <class T> Vector3<T> positions(int slot) const { return readVector<T>(values_, position, slot); }
+
+  /// Copies all of one rod, the frames of its ends and its loose cells included.
+  void copyRod(const Elements &elements, int rod, const Configuration &from);
+  /// Copies what a rod has beside its own edges: the frames of supports.
+  void copyEnds(const Elements &elements, int rod, const Configuration &from);
+  bool empty() const { return values_.size() == 0; }
+  /// Frames of the first edge of a ring, and positions of its first two vertices, behind its last.
+  void closeRing(const RodRange &rod);
+
+private:
+  Planes values_;
+  void copySlots(const Configuration &from, int begin, int end);
 };
 
 /// Configuration of a state; supports' frames at `motion_time` of their prescribed motion.
 Configuration configurationOf(const State &state, const Scene &scene, const Elements &elements, double motion_time);
+/// The same into a configuration of that scene.
+void setConfiguration(const State &state, const Scene &scene, const Elements &elements, double motion_time, Configuration &c);
 
 /// Present frame of a support.
 Frame supportFrame(const Support &support, double motion_time);
+
+/// Visits the cells of a rod: `visit(slot, frame0, frame1, count)`, as Packs of `count` regular cells, then one by one the loose ones
+/// (template argument double). The tail of the last pack has no cells: its constants are zero.
+template <class Visit> void forCells(const Elements &elements, int rod, Visit visit) {
+  const int end = elements.cell_end[rod];
+  for (int s = elements.cell_begin[rod]; s < end; s += lanes) visit.template operator()<Pack>(LooseCell{s, s - 1, s, s}, std::min(lanes, end - s));
+  for (const LooseCell &cell : elements.loose[rod]) visit.template operator()<double>(cell, 1);
+}
+
+/// The two frames of a cell. In lanes without a cell the second is the first: they have no strain.
+template <class T> std::array<FrameOf<T>, 2> cellFrames(const Configuration &c, const LooseCell &cell, int count) {
+  std::array<FrameOf<T>, 2> f{c.frames<T>(cell.frame0), c.frames<T>(cell.frame1)};
+  if constexpr (std::is_same_v<T, Pack>)
+    if (count < lanes) {
+      const Pack::mask_type live = firstLanes(count);
+      for (int a = 0; a < 3; ++a) {
+        f[1].tangent[a] = select(live, f[1].tangent[a], f[0].tangent[a]);
+        f[1].director[a] = select(live, f[1].director[a], f[0].director[a]);
+      }
+      f[1].length = select(live, f[1].length, f[0].length);
+    }
+  return f;
+}
+
+/// Constants of a cell with its whole turns.
+template <class T> CellOf<T> cellOf(const Planes &cells, const Configuration &c, int slot) {
+  using std::floor;
+  CellOf<T> cell = readCell<T>(cells, slot);
+  cell.turns = read<T>(c[Configuration::turns] + slot);
+  const T half = floor(cell.turns * T(0.5 / pi) + T(0.5)) * T(0.5);
+  cell.sign = T(1.0) - T(4.0) * (half - floor(half)); // -1 when their number is odd
+  return cell;
+}
 
 } // namespace tendril

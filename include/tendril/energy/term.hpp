@@ -1,6 +1,6 @@
 #pragma once
 /// \file term.hpp
-/// A term of the incremental potential: its value and its derivatives over the rows of one rod. To add an energy, write one file with a
+/// A term of the incremental potential: its value and its derivatives over the slots of one rod. To add an energy, write one file with a
 /// class derived from Term and add one line to makeTerms (terms.cpp).
 
 #include "tendril/dynamics/state.hpp"
@@ -23,30 +23,41 @@ struct Step {
   bool isStatic() const { return dt == 0; }
 };
 
-/// Sums over rows; see DofMap. `equilibrium` is the gradient with the stretching force taken from the independent axial force.
-struct Rows {
-  std::vector<double> gradient, equilibrium, band;
+/// First and second derivatives by x, y, z and twist of each slot (see DofMap). Terms add to `equilibrium`, where the stretching force is the
+/// independent axial force; `gradient`, of the potential itself, differs by the forces that stretch adds there.
+struct Derivatives {
+  Planes gradient, equilibrium;
+  Band band;
+  explicit Derivatives(const DofMap &dofs) : gradient(dofs.makePlanes()), equilibrium(dofs.makePlanes()), band(dofs) {}
 };
 
 class Term {
 public:
   virtual ~Term() = default;
-  /// Called once before the iterations of a step.
-  virtual void beginStep(const State & /*start*/, const Configuration & /*start*/, const Step & /*step*/) {}
-  /// Called whenever the iterate has moved.
-  virtual void moveIterate(const Configuration & /*iterate*/) {}
+  /// Called once before the iterations of a step. `start` stays in place until the next.
+  virtual void beginStep(const State & /*state*/, const Configuration & /*start*/, const Step & /*step*/) {}
+  /// Called whenever the iterate of a rod has moved.
+  virtual void moveIterate(const Configuration & /*iterate*/, int /*rod*/) {}
   /// Called when the load factor changes within a step.
   virtual void setLoadFactor(double /*factor*/) {}
   /// [J], up to a constant of the step. Not finite where the configuration is impossible.
   virtual double energy(const Configuration &configuration, int rod) const = 0;
   /// Adds gradient and Hessian, pulled back by the retraction at the configuration.
-  virtual void addDerivatives(const Configuration &configuration, int rod, Rows &rows, HessianKind hessian = HessianKind::exact) const = 0;
+  virtual void addDerivatives(const Configuration &configuration, int rod, Derivatives &out, HessianKind hessian = HessianKind::exact) const = 0;
 };
 
-/// Axial force of every edge as a linear law of its strain over one step: stiffness (strain - rest), dissipation included.
-struct AxialLaw {
-  std::vector<double> stiffness, rest;
-  void beginStep(const Scene &scene, const Elements &elements, const Configuration &start, const Step &step);
+/// Axial force of every edge as a linear law of its strain over one step: stiffness (strain - rest), dissipation included. Over slots.
+class AxialLaw {
+public:
+  AxialLaw(const Scene &scene, const Elements &elements);
+  void beginStep(const Configuration &start, const Step &step);
+  const double *stiffness() const { return planes_[0]; } ///< [N]
+  const double *rest() const { return planes_[1]; }
+
+private:
+  const Scene &scene_;
+  const Elements &elements_;
+  Planes planes_;
 };
 
 /// The terms that the scene needs, in a fixed order; stretch is the first.
@@ -57,14 +68,20 @@ std::unique_ptr<Term> makeStretch(const Elements &, const AxialLaw &);
 std::unique_ptr<Term> makeInertia(const Scene &, const Elements &);
 std::unique_ptr<Term> makeLoad(const Scene &, const Elements &);
 
-/// Present strains of one cell, integrated over it [rad].
-std::array<double, 3> presentStrain(const Elements &elements, const Configuration &configuration, int rod, int cell);
+/// Present strains of a cell (or a pack of `count` cells), integrated over it [rad].
+template <class T> std::array<T, 3> presentStrain(const Elements &elements, const Configuration &configuration, int rod, const LooseCell &cell, int count = 1) {
+  const auto [f0, f1] = cellFrames<T>(configuration, cell, count);
+  const CellOf<T> constants = cellOf<T>(elements.cells(), configuration, cell.slot);
+  return elements.measure[rod] == Measure::tan ? cellStrain<Measure::tan>(f0, f1, constants) : cellStrain<Measure::angle>(f0, f1, constants);
+}
 
 /// Stored and kinetic energies of a state [J].
 struct EnergyBudget {
   double kinetic = 0, stretch = 0, bend = 0, twist = 0, gravity = 0;
   double total() const { return kinetic + stretch + bend + twist + gravity; }
 };
+/// \param configuration that of the state
+EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, const Configuration &configuration, double load_factor);
 EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, double load_factor);
 
 } // namespace tendril

@@ -25,8 +25,7 @@ template <class T> Vector3<T> transport(const Vector3<T> &v, const Vector3<T> &f
 
 /// Rotates `v`, normal to the unit vector `axis`, by `angle` [rad] about it.
 template <class T> Vector3<T> rotateAbout(const Vector3<T> &v, const Vector3<T> &axis, const T &angle) {
-  using std::cos, std::sin;
-  return v * cos(angle) + axis.cross(v) * sin(angle);
+  return v * cosine(angle) + axis.cross(v) * sine(angle);
 }
 
 /// Angle from one frame to another about the second's tangent after minimal rotation, given by the cosine and sine of its half.
@@ -34,8 +33,7 @@ template <class T> Vector3<T> rotateAbout(const Vector3<T> &v, const Vector3<T> 
 template <class T> struct HalfAngle {
   T cosine, sine;
   T angle() const {
-    using std::atan2;
-    return T(2.0) * atan2(sine, cosine);
+    return T(2.0) * arcTangent2(sine, cosine);
   }
 };
 

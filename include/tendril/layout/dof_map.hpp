@@ -1,67 +1,109 @@
 #pragma once
 /// \file dof_map.hpp
 /// Where the unknowns are. Three numberings:
-///   vertices and edges   of the whole scene, rod after rod, in scene order;
-///   rows                 v0 (3), e0 (1), v1 (3), e1 (1), ... of each rod, with the rows a cell may touch beyond its ends: four spare rows
-///                        before and after an open rod, copies of v0, e0, v1 behind a closed one. Element loops work on rows and
-///                        know neither ends nor rings;
-///   unknowns             of PETSc's global vector: rows that are neither spare, nor copies, nor held by a support.
-/// Cables have no twist: their vertices follow each other at three rows.
+///   vertices and edges   of the whole scene, rod after rod, in scene order, as files have them;
+///   slots                of the arrays the element loops stream through: vertex i, edge i and the cell at vertex i of a rod share its slot
+///                        first_slot + i. Behind a ring come copies of its first two vertices and first edge; around an open rod there is room for
+///                        the frames that clamps hold. Element loops know neither ends nor rings;
+///   unknowns             of PETSc's global vector: x, y, z and twist of each slot that neither is a copy nor is held by a support.
 
+#include "tendril/geometry/planes.hpp"
 #include "tendril/layout/petsc.hpp"
 #include "tendril/model/scene.hpp"
 
+#include <array>
+
 namespace tendril {
 
-/// Numbering and unknowns of one rod.
+/// Numbering of one rod.
 struct RodRange {
   int first_vertex, vertices;
   int first_edge, edges;
-  int first_row; ///< of vertex 0
-  int rows;      ///< rows of its own, without spares and copies
-  int stride;    ///< rows from a vertex to the next: 4, or 3 for a cable
+  int first_slot; ///< of vertex 0; a multiple of the lanes
+  int slots;      ///< from this rod's first slot to the next rod's
+  bool twist;     ///< false for a cable
   bool closed;
+
+  int slot(int i) const { return first_slot + i; }
+  int vertexEnd() const { return first_slot + vertices; }
+  int edgeEnd() const { return first_slot + edges; }
+};
+
+/// Unknowns of a slot: x, y, z, twist.
+inline constexpr int slot_size = 4;
+/// Couplings of an unknown to those after it, itself included: the 11 unknowns of a cell.
+inline constexpr int band_width = cell_size;
+/// Entries of the band in the rows of one slot.
+inline constexpr int slot_entries = slot_size * band_width;
+
+class DofMap;
+
+/// Upper band of symmetric matrices of all rods: entry (a, k) of slot s couples unknown a of the slot with the k-th after it. Each of the
+/// 44 entries is a plane over the slots of a rod.
+class Band {
+public:
+  Band() = default;
+  explicit Band(const DofMap &dofs);
+  double *entry(const RodRange &rod, int a, int k) { return data_.data() + offset(rod, a, k); }
+  const double *entry(const RodRange &rod, int a, int k) const { return data_.data() + offset(rod, a, k); }
+  const double *data() const { return data_.data(); }
+  void clear(const RodRange &rod);
+  /// Becomes other - this.
+  void subtractFrom(const Band &other);
+  /// y += A x for one rod, copies behind a ring included in x and in y.
+  void multiply(const RodRange &rod, const Planes &x, Planes &y) const;
+
+  /// Where the plane of an entry begins in data().
+  static std::size_t offset(const RodRange &rod, int a, int k) {
+    return std::size_t(slot_entries) * rod.first_slot + std::size_t(a * band_width + k) * rod.slots;
+  }
+
+private:
+  AlignedVector data_;
 };
 
 class DofMap {
 public:
-  /// Rows a row couples to, itself included: the 11 unknowns of a cell.
-  static constexpr int band = cell_size;
-
   PetscErrorCode setUp(const Scene &scene);
 
   const std::vector<RodRange> &rods() const { return rods_; }
   int vertices() const { return vertices_; }
   int edges() const { return edges_; }
-  int rows() const { return rows_; }
+  int slots() const { return slots_; }
   PetscInt unknowns() const { return unknowns_; }
-  int vertexRow(const RodRange &rod, int vertex) const { return rod.first_row + rod.stride * vertex; }
-  int twistRow(const RodRange &rod, int edge) const { return rod.first_row + rod.stride * edge + 3; }
-  /// Unknown of each row, or -1 where the row is spare or held.
-  const std::vector<PetscInt> &unknownOfRow() const { return unknown_of_row_; }
+  /// Unknown of a slot's x, y, z (a = 0, 1, 2) or twist (3), or -1 where it is held or does not exist.
+  PetscInt unknown(int slot, int a) const { return unknown_[std::size_t(slot_size) * slot + a]; }
   bool isHeld(int vertex) const { return held_[vertex]; }
+  Planes makePlanes() const { return Planes(slot_size, slots_); }
 
   DM dm() const { return dm_; }
-  /// Matrix over the unknowns, preallocated for the band; values come in the order of fillMatrix.
+  /// Matrix of PETSc's own type over the unknowns, preallocated for the band of every rod.
   PetscErrorCode createMatrix(Mat *matrix);
-  /// Adds the band (rows x band, upper part: entry (r, k) couples rows r and r + k) into the matrix, both triangles.
-  PetscErrorCode fillMatrix(const std::vector<double> &band_values, Mat matrix);
-  /// out[unknown] = sum of the rows that stand for it.
-  PetscErrorCode gather(const std::vector<double> &row_values, Vec out) const;
-  /// Rows from unknowns; spare and held rows are left as they are.
-  PetscErrorCode scatter(Vec in, std::vector<double> &row_values) const;
+  /// Puts the band into the matrix, both triangles.
+  PetscErrorCode fillMatrix(const Band &band, Mat matrix);
+
+  /// Copies of the first vertices and edge of closed rods behind their last.
+  void copyBehindRings(Planes &increment) const;
+  /// Adds what was summed into the copies behind a ring to the slots they stand for.
+  void fold(const RodRange &rod, Planes &sums) const;
+  void fold(const RodRange &rod, Band &band) const;
+
+  /// out = values of the unknowns, rod by rod; rods not in `wanted` get zero.
+  PetscErrorCode gather(const Planes &values, Vec out, const std::vector<char> *wanted = nullptr) const;
+  /// Values of all slots from unknowns: zero where held, copies behind rings included.
+  PetscErrorCode scatter(Vec in, Planes &values) const;
 
 private:
   std::vector<RodRange> rods_;
-  int vertices_ = 0, edges_ = 0, rows_ = 0;
+  int vertices_ = 0, edges_ = 0, slots_ = 0;
   PetscInt unknowns_ = 0;
   std::vector<bool> held_;
-  std::vector<PetscInt> unknown_of_row_;
-  std::vector<PetscInt> band_slot_; ///< slots of the band that reach the matrix, in the order of the matrix's entries
+  std::vector<PetscInt> unknown_;
+  std::vector<std::size_t> source_; ///< entries of the matrix in its own order: where their value is in the band
   std::vector<double> entries_;
   OwnedDM dm_;
 
-  PetscErrorCode createSection(const Scene &scene, PetscSection *section) const;
+  PetscErrorCode createSection(PetscSection *section) const;
 };
 
 } // namespace tendril

@@ -22,6 +22,7 @@ public:
     if (object_) (void)destroy(&object_);
   }
   operator Object() const { return object_; }
+  Object object() const { return object_; }
   /// For PETSc's creation routines, which return through a pointer.
   Object *out() { return &object_; }
 

@@ -1,40 +1,72 @@
 #pragma once
 /// \file elements.hpp
-/// The scene cut into elements: edges (stretch, twist inertia), vertices (mass) and cells (bending and twist), as arrays the element loops
-/// stream through. Built once; constant afterwards.
+/// The scene cut into elements: edges (stretch, twist inertia), vertices (mass) and cells (bending and twist), as arrays over slots (see DofMap)
+/// that the element loops stream through. Built once; constant afterwards.
 
 #include "tendril/layout/dof_map.hpp"
 
 namespace tendril {
 
-/// Cells of the whole scene, rod after rod. A cell joins two frames; frames below the number of edges are those of edges, the others belong
-/// to supports. The arrays are padded by one pack so that a loop may read beyond the last cell.
-struct CellArrays {
-  std::vector<int> frame0, frame1;
-  std::vector<int> row; ///< first of the 11 rows
-  std::array<std::vector<double>, 3> stiffness, rest;
-  std::array<std::vector<double>, 2> weight, free;
-  std::vector<double> length; ///< reference length of the cell, Lbar [m]
-
-  int size() const { return int(length.size()); }
-  void pad();
+/// A cell that is not the one between the two edges at its slot: half cells of supports along a rod. Its constants have a slot of their own.
+struct LooseCell {
+  int slot;
+  int frame0, frame1; ///< slots of the frames it joins
+  int vertex;         ///< slot of the vertex in the middle of its unknowns
 };
 
-struct Elements {
+class Elements {
+public:
   std::vector<RodRange> rods;
-  std::vector<int> rod_cells;   ///< offsets (nr + 1)
   std::vector<Measure> measure; ///< per rod
+  int slots = 0;                ///< those of DofMap, then those of loose cells and their frames
 
-  std::vector<int> vertex0, vertex1, edge_row;                                       ///< per edge; rows of its vertices begin at edge_row and edge_row + stride
-  std::vector<double> rest_length, inverse_rest_length, axial_stiffness, twist_mass; ///< per edge; twist_mass r_L L [kg m^2]
-  std::vector<double> mass;                                                          ///< per vertex [kg]
-  std::vector<int> vertex_row;                                                       ///< per vertex
-  CellArrays cells;
+  /// Regular cells of a rod, [begin, end): the cell at slot s joins the frames at s - 1 and s.
+  std::vector<int> cell_begin, cell_end;
+  std::vector<std::vector<LooseCell>> loose; ///< per rod
+  std::vector<int> support_slot;             ///< of each support's frame, or -1 where nothing meets it
 
-  std::vector<int> support_frame; ///< frame of each support, or -1
-  int frames = 0;                 ///< edges and support frames
+  // In scene order.
+  std::vector<int> vertex0, vertex1; ///< ends of each edge
+  std::vector<int> vertex_slot, edge_slot, cell_slot;
+  std::vector<int> rod_cells; ///< offsets of the rods' cells (nr + 1)
+
+  // Over slots; zero where there is no such element, except rest lengths, which are one there.
+  const double *mass() const { return constants_[0]; }                ///< of vertices [kg]
+  const double *restLength() const { return constants_[1]; }          ///< of edges [m]
+  const double *inverseRestLength() const { return constants_[2]; }   ///< [1/m]
+  const double *axialStiffness() const { return constants_[3]; }      ///< [N]
+  const double *twistMass() const { return constants_[4]; }           ///< r_L L of edges [kg m^2]
+  const double *freedom() const { return constants_[5]; }             ///< 1 for vertices that are not held
+  const double *cellLength() const { return constants_[6]; }          ///< Lbar [m]
+  /// stiffness, 3 planes; rest, 3; weight, 2; free, 2 (CellOf)
+  const Planes &cells() const { return cells_; }
+  int vertices() const { return int(vertex_slot.size()); }
+  int edges() const { return int(edge_slot.size()); }
 
   Elements(const Scene &scene, const DofMap &dofs);
+
+private:
+  Planes constants_, cells_;
+  friend class CellBuilder;
 };
+
+/// Planes of Elements::cells().
+enum CellPlane : int { cell_stiffness = 0, cell_rest = 3, cell_weight = 6, cell_free = 8, cell_planes = 10 };
+
+/// Constants of the cell (or pack of cells) at a slot, without turns.
+template <class T> CellOf<T> readCell(const Planes &cells, int slot) {
+  CellOf<T> c;
+  for (int k = 0; k < 3; ++k) {
+    c.stiffness[k] = read<T>(cells[cell_stiffness + k] + slot);
+    c.rest[k] = read<T>(cells[cell_rest + k] + slot);
+  }
+  for (int k = 0; k < 2; ++k) {
+    c.weight[k] = read<T>(cells[cell_weight + k] + slot);
+    c.free[k] = read<T>(cells[cell_free + k] + slot);
+  }
+  c.turns = T(0.0);
+  c.sign = T(1.0);
+  return c;
+}
 
 } // namespace tendril

@@ -1,50 +1,63 @@
 #pragma once
 /// \file banded.hpp
-/// LDL^T of the Hessian of chains and rings, without pivoting: the band of a cell, and for a ring the few last rows that also meet its first
-/// (a border). The signs of the pivots give the inertia (Sylvester). Registered with PETSc as the solver type `banded` for Cholesky.
+/// LDL^T of the Hessians of chains and rings, without pivoting: the band of a cell, and for a ring the last rows that also meet its first (a
+/// border). The signs of the pivots give the inertia (Sylvester). Rods of the same shape are factored together, one to a lane.
+/// Registered with PETSc as the solver type `banded` for Cholesky.
 
-#include "tendril/layout/petsc.hpp"
-
-#include <vector>
+#include "tendril/layout/dof_map.hpp"
 
 namespace tendril {
 
-class BandedCholesky {
-public:
-  /// Couplings to the next rows kept in the band: the cell has 11 unknowns.
-  static constexpr int half_band = 10;
-
-  /// Finds the blocks and borders in a symmetric CSR pattern (both triangles). False when it is neither a set of chains nor of rings.
-  bool analyse(PetscInt rows, const PetscInt *row_start, const PetscInt *column);
-  /// Factors values of the analysed pattern.
-  void factor(const PetscInt *row_start, const PetscInt *column, const PetscScalar *value);
-  /// x may be b.
-  void solve(const PetscScalar *b, PetscScalar *x) const;
-
-  PetscInt negativePivots() const { return negative_; }
-  /// Pivots lost in rounding (|pivot| within a few epsilon of its diagonal): motions that cost no energy. They are replaced by a small
-  /// positive number, so that a solve does not move along them.
-  PetscInt neutralPivots() const { return neutral_; }
-
-private:
-  static constexpr int width = 16; ///< of a stored row, padded for vector loads
-
-  /// A block of rows that couple among themselves; the last `border` of them also meet rows further away.
-  struct Block {
-    PetscInt begin, end;
-    int border;
-  };
-  PetscInt rows_ = 0, negative_ = 0, neutral_ = 0;
-  std::vector<Block> blocks_;
-  std::vector<double> band_;     ///< row i: pivot, then entries (i, i + 1 ... i + 10) of L'
-  std::vector<double> diagonal_; ///< before elimination
-  std::vector<std::vector<double>> far_; ///< per block: border x rows entries beyond the band
-
-  double pivot(PetscInt row);
-  void eliminate(const Block &block, std::vector<double> &far);
+/// What there is to factor: band + shift x metric of the rods that are wanted.
+struct BandedSystem {
+  const DofMap *dofs = nullptr;
+  const Band *band = nullptr;
+  const Planes *metric = nullptr;
+  std::vector<char> wanted;  ///< per rod; the others are left out, and a solve gives them zero
+  std::vector<double> shift; ///< per rod
 };
 
-/// Registers `-pc_factor_mat_solver_type banded` for MATSEQAIJ.
+class BandedFactor {
+public:
+  explicit BandedFactor(const DofMap &dofs);
+
+  void factor(const BandedSystem &system);
+  /// By the unknowns of all rods; x may be b.
+  void solve(const PetscScalar *b, PetscScalar *x);
+
+  int rods() const { return int(order_.size()); }
+  int negativePivots(int rod) const { return negative_[rod]; }
+  /// Pivots lost in rounding (|pivot| within a few epsilon of its diagonal): motions that cost no energy. They are replaced by a small
+  /// positive number, so that a solve does not move along them.
+  int neutralPivots(int rod) const { return neutral_[rod]; }
+  std::size_t bytes() const { return (band_.size() + far_.size() + rows_.size()) * sizeof(double); }
+
+private:
+  /// Rods factored together: one, or as many as there are lanes of a pack.
+  struct Group {
+    std::array<int, lanes> rod;
+    int count;
+    bool packed;
+    std::size_t band, far; ///< where its factor begins
+  };
+  const DofMap &dofs_;
+  std::vector<int> order_;              ///< rods by shape
+  std::vector<std::vector<int>> fixed_; ///< per rod: rows that are held or do not exist
+  std::vector<Group> groups_;
+  std::vector<int> negative_, neutral_;
+  AlignedVector band_, far_, rows_;
+
+  void plan(const std::vector<char> &wanted);
+  template <class T> void factorGroup(const Group &group, const BandedSystem &system);
+  template <class T> void solveGroup(const Group &group, const PetscScalar *b, PetscScalar *x);
+};
+
+/// Registers `-pc_factor_mat_solver_type banded`.
 PetscErrorCode registerBanded();
+/// Matrix whose entries are those of `system`, which must outlive it; its Cholesky factorisation is `banded`. Increase its state
+/// (PetscObjectStateIncrease) when the values have changed.
+PetscErrorCode createBandedMatrix(BandedSystem *system, Mat *matrix);
+/// The factorisation inside PETSc's factored matrix, or null when it is another's.
+const BandedFactor *bandedFactorOf(Mat factored);
 
 } // namespace tendril

@@ -1,0 +1,179 @@
+/// Indefinite Hessians: descent directions from shifted ones, and the ways out of saddles.
+#include "tendril/solver/newton.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tendril {
+
+/// Direction for an indefinite Hessian. A few negative pivots mean a state near a branching: a shifted diagonal keeps most of Newton's speed there.
+/// Many mean compressed edges: then their compression is left out of the Hessian, and the diagonal shifted only if that is not enough.
+/// Couples have no potential and no definite Hessian: for them Newton's own direction stands as long as it goes downhill.
+PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
+  constexpr int few = 4; // the two planes of the first two buckling modes
+  KSP ksp;
+  PetscFunctionBeginUser;
+  if (regular && !potential_->scene().moments.empty()) {
+    PetscScalar slope;
+    PetscCall(VecDot(f, y, &slope));
+    if (slope > 0) PetscFunctionReturn(0);
+  }
+  const int unshifted = report_.negative_pivots;
+  const HessianKind kind = potential_->step().hessian == HessianKind::exact ? HessianKind::uncompressed : potential_->step().hessian;
+  bool compressed = false;
+  for (int r = 0; r < potential_->rods(); ++r) {
+    if (!system_.wanted[r] || negative_[r] <= (banded_ ? few : few * potential_->rods())) continue;
+    potential_->assembleRod(r, kind);
+    compressed = true;
+  }
+  if (compressed) {
+    PetscCall(refactor());
+    PetscCall(readInertia(&regular));
+    ++report_.shifts;
+  }
+  PetscCall(shiftUntilPositive(regular));
+  PetscCall(SNESGetKSP(snes_, &ksp));
+  PetscCall(KSPSolve(ksp, f, y));
+  report_.negative_pivots = unshifted;
+  PetscFunctionReturn(0);
+}
+
+/// First shift to try [1/s^2]: the slowest bending wave of the rod where it is fastest, EI/(rho L^4), or the edge's own axial one for a cable.
+double NewtonSolver::firstShift(int r) const {
+  const Rod &rod = potential_->scene().rods[r];
+  double length = 0;
+  for (int i = 0; i < rod.edges(); ++i) length += rod.edge(i).norm();
+  const Material &m = rod.material;
+  const auto [k1, k2] = m.flexural_stiffness;
+  const double softest = k1 > 0 && k2 > 0 ? std::min(k1, k2) : std::max(k1, k2);
+  const double stiffness = m.isCable() ? 1e-6 * m.axial_stiffness : 10 * softest / (length * length);
+  return stiffness / (m.linear_density * length * length);
+}
+
+/// Adds multiples of the metric to the Hessians of rods with negative pivots until there are none, so that the step goes downhill. Starts near
+/// the last shift that was needed, so that a run of indefinite iterates costs one extra factorisation each.
+PetscErrorCode NewtonSolver::shiftUntilPositive(bool regular) {
+  PetscFunctionBeginUser;
+  for (int attempt = 0; attempt < 40; ++attempt) {
+    bool any = false;
+    for (int r = 0; r < potential_->rods(); ++r) {
+      if (!system_.wanted[r] || (negative_[r] == 0 && regular)) continue;
+      double &shift = system_.shift[r];
+      shift = shift > 0 ? 8 * shift : last_shift_[r] > 0 ? 0.25 * last_shift_[r] : firstShift(r);
+      last_shift_[r] = shift;
+      any = true;
+    }
+    if (!any) break;
+    PetscCall(refactor());
+    PetscCall(readInertia(&regular));
+    ++report_.shifts;
+  }
+  PetscFunctionReturn(0);
+}
+
+/// A direction of negative curvature at an unstable equilibrium, in increment_. With the Hessian K = E - G split into the part E without
+/// compression and the effect G of compression, iterating v <- E^-1 G v gives the first buckling mode, the smoothest way out. Where compression
+/// is not the cause, inverse iteration with the shifted Hessian finds the lowest mode.
+PetscErrorCode NewtonSolver::findBucklingMode(bool *found) {
+  PetscFunctionBeginUser;
+  const DofMap &dofs = potential_->dofs();
+  const Elements &e = potential_->elements();
+  Band softening = potential_->derivatives().band;
+  auto dot = [](const Planes &a, const Planes &b) {
+    double sum = 0;
+    for (std::size_t k = 0; k < a.size(); ++k) sum += a.data()[k] * b.data()[k];
+    return sum;
+  };
+  // A fixed start without symmetry: the same on every machine, orthogonal to no mode of interest.
+  increment_.clear();
+  for (const RodRange &rod : e.rods)
+    for (int i = 0; i < rod.vertices; ++i)
+      for (int a = 0; a < slot_size; ++a)
+        if (dofs.unknown(rod.slot(i), a) >= 0) increment_[a][rod.slot(i)] = 1 + 0.5 * std::sin(1.7 * (slot_size * i + a));
+  dofs.copyBehindRings(increment_);
+  bool regular;
+  for (int r = 0; r < potential_->rods(); ++r) potential_->assembleRod(r, HessianKind::uncompressed);
+  PetscCall(refactor());
+  PetscCall(readInertia(&regular));
+  const bool buckles = regular && report_.negative_pivots == 0;
+  if (buckles)
+    softening.subtractFrom(potential_->band());
+  else {
+    for (int r = 0; r < potential_->rods(); ++r) potential_->assembleRod(r, HessianKind::exact);
+    PetscCall(shiftUntilPositive(false));
+  }
+  // With A v = b solved, v'K v = v'b - v'(A - K)v: the stiff part of A never enters, whose rounding would hide a small curvature.
+  auto soften = [&] { // (A - K) v
+    Planes y = dofs.makePlanes();
+    for (std::size_t r = 0; r < e.rods.size(); ++r) {
+      const RodRange &rod = e.rods[r];
+      if (buckles) {
+        softening.multiply(rod, increment_, y);
+        dofs.fold(rod, y);
+      } else
+        for (int a = 0; a < slot_size; ++a)
+          for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) y[a][s] = system_.shift[r] * metric_[a][s] * increment_[a][s];
+    }
+    return y;
+  };
+  auto normalise = [&] {
+    double norm = 0;
+    for (std::size_t k = 0; k < metric_.size(); ++k) norm += metric_.data()[k] * increment_.data()[k] * increment_.data()[k];
+    for (double &d : increment_) d /= std::sqrt(norm);
+  };
+  *found = false;
+  normalise();
+  Planes right = soften();
+  for (int k = 0; k < 100 && !*found; ++k) {
+    PetscCall(solveLinear(right, increment_));
+    *found = k >= 5 && dot(increment_, right) < dot(increment_, soften());
+    normalise();
+    right = soften();
+  }
+  for (int r = 0; r < potential_->rods(); ++r) potential_->assembleRod(r, potential_->step().hessian);
+  PetscFunctionReturn(0);
+}
+
+/// Leaves a saddle along a direction of negative curvature; its side and length come from trials of growing size, with both retractions:
+/// edges that are just right must keep their lengths, edges that an unstable state holds compressed must be free to grow.
+PetscErrorCode NewtonSolver::escapeSaddle(bool *left) {
+  PetscFunctionBeginUser;
+  *left = false;
+  bool found;
+  PetscCall(findBucklingMode(&found));
+  if (!found) PetscFunctionReturn(0);
+  // One unit: the edge that turns most turns by one radian.
+  double turning = 0;
+  const Elements &e = potential_->elements();
+  for (const RodRange &rod : e.rods)
+    for (int s = rod.first_slot; s < rod.edgeEnd(); ++s) {
+      for (int a = 0; a < 3; ++a) turning = std::max(turning, std::abs(increment_[a][s + 1] - increment_[a][s]) * e.inverseRestLength()[s]);
+      turning = std::max(turning, std::abs(increment_[3][s]));
+    }
+  for (double &d : increment_) d /= turning;
+  auto move = [&](RetractionKind kind, double scale) {
+    for (int r = 0; r < potential_->rods(); ++r)
+      if (!potential_->tryMove(increment_, scale, r, kind, trial_)) return false;
+    return true;
+  };
+  RetractionKind best_kind = RetractionKind::length;
+  double best = potential_->energy(potential_->iterate()), best_scale = 0;
+  for (const RetractionKind kind : {RetractionKind::length, RetractionKind::additive})
+    for (double scale = 1e-6; scale < 2; scale *= 2) // just past a branching of a stiff rod the other branch is that close
+      for (const double s : {scale, -scale}) {
+        const double energy = move(kind, s) ? potential_->energy(trial_) : HUGE_VAL;
+        if (energy >= best) continue;
+        best = energy;
+        best_scale = s;
+        best_kind = kind;
+      }
+  *left = best_scale != 0 && move(best_kind, best_scale);
+  if (!*left) PetscFunctionReturn(0);
+  potential_->accept(trial_);
+  potential_->resetAxialForces();
+  forgetEnergies();
+  ++report_.escapes;
+  PetscFunctionReturn(0);
+}
+
+} // namespace tendril
