@@ -48,10 +48,10 @@ TEST(RigidMotion, RepeatedTenThousandTimesLeavesTheStrains) {
   auto strains = [&] {
     std::vector<double> all;
     const Configuration c = configurationOf(s, sim.scene, e, 0);
-    for (int n = 0; n < e.cells.size(); ++n)
-      if (e.cells.free[0][n] * e.cells.free[1][n] == 1) // not the half cell of the clamp, whose frame stays
-        for (const double strain : presentStrain(e, c, 0, n)) all.push_back(strain);
-    all.insert(all.end(), c.strain.begin(), c.strain.end());
+    for (const int n : e.cell_slot)
+      if (e.cells()[cell_free][n] * e.cells()[cell_free + 1][n] == 1) // not the half cell of the clamp, whose frame stays
+        for (const double strain : presentStrain<double>(e, c, 0, {n, n - 1, n, n})) all.push_back(strain);
+    for (const int i : e.edge_slot) all.push_back(c[Configuration::strain][i]);
     return all;
   };
   const std::vector<double> before = strains();
@@ -121,11 +121,11 @@ TEST(FoldBarrier, IsNotSteppedOver) {
     Simulation sim;
     EXPECT_PETSC(sim.setUp(clampedScene(rod), dynamics(0.01, 1)));
     sim.potential->beginStep(sim.state, TimeLoop::stepOf(dynamics(0.01, 1), sim.state, 0.01));
-    std::vector<double> increment(sim.dofs.rows(), 0.0);
+    Planes increment = sim.dofs.makePlanes();
     Configuration trial;
     auto possible = [&](double degrees) {
       const Vec3 d = corner(degrees) - corner(170);
-      for (int a = 0; a < 3; ++a) increment[sim.elements->vertex_row[2] + a] = d[a];
+      increment.setVector(0, sim.elements->vertex_slot[2], d);
       return sim.potential->tryMove(increment, 1, trial);
     };
     EXPECT_TRUE(possible(179));
@@ -234,7 +234,11 @@ TEST(StiffnessDamping, IsTheRatePotentialOfTheStoredEnergy) {
   Random random(5);
   for (Vec3 &x : moved.position) x += 2e-3 * random.vector();
   Configuration to = configurationOf(moved, plain.scene, *plain.elements, 0);
-  for (std::size_t i = 0; i < moved.director.size(); ++i) to.frame[i].director = orthonormalised(to.frame[i].director, to.frame[i].tangent);
+  for (const int i : plain.elements->edge_slot) {
+    Frame f = to.frameAt(i);
+    f.director = orthonormalised(f.director, f.tangent);
+    to.setFrame(i, f);
+  }
   Step step;
   step.dt = step.time = 0.01;
   auto added = [&](const Configuration &c) { return damped.potential->energy(c) - plain.potential->energy(c); };
@@ -242,13 +246,12 @@ TEST(StiffnessDamping, IsTheRatePotentialOfTheStoredEnergy) {
   damped.potential->beginStep(damped.state, step);
   const Configuration from = plain.potential->iterate();
   double expected = 0;
-  for (std::size_t i = 0; i < from.strain.size(); ++i) {
-    const double d = to.strain[i] - from.strain[i];
-    expected += 0.5 * plain.elements->axial_stiffness[i] * plain.elements->rest_length[i] * d * d;
-  }
-  for (int c = 0; c < plain.elements->cells.size(); ++c) {
-    const auto s0 = presentStrain(*plain.elements, from, 0, c), s1 = presentStrain(*plain.elements, to, 0, c);
-    for (int k = 0; k < 3; ++k) expected += 0.5 * plain.elements->cells.stiffness[k][c] * std::pow(s1[k] - s0[k], 2);
+  const Elements &e = *plain.elements;
+  for (const int i : e.edge_slot) expected += 0.5 * e.axialStiffness()[i] * e.restLength()[i] * std::pow(to[Configuration::strain][i] - from[Configuration::strain][i], 2);
+  for (const int c : e.cell_slot) {
+    const LooseCell cell{c, c - 1, c, c};
+    const auto s0 = presentStrain<double>(e, from, 0, cell), s1 = presentStrain<double>(e, to, 0, cell);
+    for (int k = 0; k < 3; ++k) expected += 0.5 * e.cells()[cell_stiffness + k][c] * std::pow(s1[k] - s0[k], 2);
   }
   const double measured = added(to) - added(from);
   EXPECT_NEAR(measured, beta / step.dt * expected, 1e-10 * std::abs(beta / step.dt * expected));
@@ -265,12 +268,12 @@ TEST(StiffnessDamping, LeavesStaticsUnchanged) {
 }
 
 /// One step of a simulation from its state.
-NewtonReport oneStep(Simulation &sim, double dt, const std::vector<double> *guess = nullptr) {
+NewtonReport oneStep(Simulation &sim, double dt, const Planes *guess = nullptr) {
   Step step;
   step.dt = dt;
   step.time = sim.state.time + dt;
   NewtonReport report;
-  EXPECT_EQ(sim.solver.solve(sim.state, step, &report, guess), PetscErrorCode(0));
+  EXPECT_EQ(sim.solver.solve(sim.state, step, &report, Seek::minimum, guess), PetscErrorCode(0));
   EXPECT_TRUE(report.converged) << report.reason;
   return report;
 }
@@ -301,8 +304,9 @@ TEST(Newton, AnswerDoesNotDependOnTheFirstGuess) {
   State plain = sim.state, guessed = sim.state;
   sim.potential->commit(plain);
   Random random(7);
-  std::vector<double> guess(sim.dofs.rows());
-  for (std::size_t k = 0; k < guess.size(); ++k) guess[k] = 2e-3 * random() * ((k % 4) == 3 ? 100 : 1);
+  Planes guess = sim.dofs.makePlanes();
+  for (const int s : sim.elements->vertex_slot)
+    for (int a = 0; a < slot_size; ++a) guess[a][s] = 2e-3 * random() * (a == 3 ? 100 : 1);
   const NewtonReport report = oneStep(sim, 0.02, &guess);
   EXPECT_GT(report.iterations, 2);
   sim.potential->commit(guessed);

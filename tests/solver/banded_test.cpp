@@ -1,106 +1,151 @@
 #include "tendril/solver/banded.hpp"
 
 #include "support/random_cell.hpp"
+#include "support/rods.hpp"
 
 #include <Eigen/Dense>
-#include <gtest/gtest.h>
 
 namespace tendril::test {
 namespace {
 
-/// A random symmetric matrix of blocks, each a band of half-width 10, rings with corners; as dense and as CSR.
+/// Chains and rings of bare vertices and edges, each named by its number of vertices; a negative number is a ring.
 struct Problem {
-  Eigen::MatrixXd dense;
-  std::vector<PetscInt> start{0}, column;
-  std::vector<PetscScalar> value;
+  Scene scene;
+  DofMap dofs;
+  BandedSystem system;
+  Band band;
+  Planes metric;
+  Eigen::MatrixXd dense; ///< over the unknowns
 };
 
-Problem makeProblem(const std::vector<std::pair<int, bool>> &blocks, double diagonal) {
-  Random random(3);
-  int n = 0;
-  for (const auto &[size, ring] : blocks) n += size;
-  Problem p;
-  p.dense = Eigen::MatrixXd::Zero(n, n);
-  std::vector<std::vector<bool>> pattern(n, std::vector<bool>(n, false));
-  int begin = 0;
-  for (const auto &[size, ring] : blocks) {
-    for (int i = 0; i < size; ++i)
-      for (int k = 0; k <= 10; ++k) {
-        if (!ring && i + k >= size) continue;
-        if (ring && i + k >= size && (i < size - 4 || (i + k) % size > 6)) continue; // the corner of a ring of rods: 4 rows meet 7
-        const int a = begin + i, b = begin + (i + k) % size;
-        const double v = k == 0 ? diagonal + random() : random();
-        p.dense(a, b) = p.dense(b, a) = v;
-        pattern[a][b] = pattern[b][a] = true;
-      }
-    begin += size;
+void addRods(Scene &scene, const std::vector<int> &rods) {
+  for (const int n : rods) {
+    const int count = std::abs(n);
+    std::vector<Vec3> points;
+    for (int i = 0; i < count; ++i) points.push_back(n < 0 ? Vec3(std::cos(2 * pi * i / count), std::sin(2 * pi * i / count), 0) : Vec3(i, 0, 0));
+    Rod rod = inextensibleRod(points);
+    rod.closed = n < 0;
+    if (rod.closed) setBishopDirectors(rod);
+    scene.rods.push_back(rod);
   }
-  for (int i = 0; i < n; ++i) {
-    for (int j = 0; j < n; ++j)
-      if (pattern[i][j]) {
-        p.column.push_back(j);
-        p.value.push_back(p.dense(i, j));
-      }
-    p.start.push_back(PetscInt(p.column.size()));
-  }
-  return p;
 }
 
-void expectSolvesAndCounts(const std::vector<std::pair<int, bool>> &blocks, double diagonal) {
-  const Problem p = makeProblem(blocks, diagonal);
-  const int n = int(p.dense.rows());
-  BandedCholesky banded;
-  ASSERT_TRUE(banded.analyse(n, p.start.data(), p.column.data()));
+/// Fills the band with what cells could put there: the 11 unknowns of three neighbouring vertices meet.
+void fill(Problem &p, double diagonal) {
+  Random random(3);
+  p.band = Band(p.dofs);
+  p.metric = p.dofs.makePlanes();
+  const int n = int(p.dofs.unknowns());
+  p.dense = Eigen::MatrixXd::Zero(n, n);
+  for (const RodRange &rod : p.dofs.rods())
+    for (int i = 0; i < rod.vertices; ++i)
+      for (int a = 0; a < slot_size; ++a)
+        for (int k = 0; k < band_width - a; ++k) {
+          const int away = (a + k) / slot_size, b = (a + k) % slot_size;
+          if (!rod.closed && i + away >= rod.vertices) continue;
+          if (rod.closed && i + away >= rod.vertices + 2) continue;
+          const int to = rod.slot((i + away) % rod.vertices);
+          const double v = k == 0 ? diagonal + random() : random();
+          p.band.entry(rod, a, k)[i] = v;
+          const PetscInt u = p.dofs.unknown(rod.slot(i), a), w = p.dofs.unknown(to, b);
+          if (u < 0 || w < 0) continue;
+          p.dense(u, w) += v;
+          if (k > 0) p.dense(w, u) += v;
+        }
+  for (const RodRange &rod : p.dofs.rods())
+    for (int i = 0; i < rod.vertices; ++i)
+      for (int a = 0; a < slot_size; ++a) p.metric[a][rod.slot(i)] = 1;
+  p.system = {&p.dofs, &p.band, &p.metric, std::vector<char>(p.dofs.rods().size(), true), std::vector<double>(p.dofs.rods().size(), 0)};
+}
+
+int negativeEigenvalues(const Eigen::MatrixXd &a) { return int((Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(a).eigenvalues().array() < 0).count()); }
+
+void expectSolvesAndCounts(const std::vector<int> &rods, double diagonal, bool held = true) {
+  Problem p;
+  addRods(p.scene, rods);
+  if (held) p.scene.supports = {hold(p.scene, 0, 0, Support::Kind::pin), hold(p.scene, 0, 3, Support::Kind::pin)};
+  ASSERT_EQ(p.dofs.setUp(p.scene), PetscErrorCode(0));
+  fill(p, diagonal);
+  BandedFactor banded(p.dofs);
+  const Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(p.dense.rows(), -1, 2);
+  Eigen::VectorXd x(b.size());
   for (int repeat = 0; repeat < 2; ++repeat) { // refactoring starts afresh
-    banded.factor(p.start.data(), p.column.data(), p.value.data());
-    Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(n, -1, 2), x(n);
+    banded.factor(p.system);
     banded.solve(b.data(), x.data());
     EXPECT_LT((p.dense * x - b).norm(), 1e-9 * b.norm()); // no pivoting: some growth for the indefinite ones
-    const Eigen::VectorXd eigenvalues = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(p.dense).eigenvalues();
-    EXPECT_EQ(banded.negativePivots(), (eigenvalues.array() < 0).count());
-    EXPECT_EQ(banded.neutralPivots(), 0);
+    int negative = 0, neutral = 0;
+    for (std::size_t r = 0; r < rods.size(); ++r) {
+      negative += banded.negativePivots(int(r));
+      neutral += banded.neutralPivots(int(r));
+    }
+    EXPECT_EQ(negative, negativeEigenvalues(p.dense));
+    EXPECT_EQ(neutral, 0);
   }
 }
 
 TEST(Banded, SolvesChainsRingsAndSetsOfThem) {
   for (const double diagonal : {12.0, 3.0, -1.0}) { // definite, indefinite
-    expectSolvesAndCounts({{43, false}}, diagonal);
-    expectSolvesAndCounts({{40, true}}, diagonal);
-    expectSolvesAndCounts({{40, true}, {19, false}, {56, true}, {7, false}}, diagonal);
-    expectSolvesAndCounts({{24, true}}, diagonal);
+    expectSolvesAndCounts({11}, diagonal);
+    expectSolvesAndCounts({-10}, diagonal, false);
+    expectSolvesAndCounts({-3, -4, -5}, diagonal, false); // the corner lies within the band
+    expectSolvesAndCounts({-10, 5, -14, 4}, diagonal);
   }
+}
+
+/// More rods of one shape than lanes, so that some are factored in packs, some in a pack that is not full, and some alone.
+TEST(Banded, SolvesManyRodsOfOneShape) {
+  for (const int shape : {7, -9}) expectSolvesAndCounts(std::vector<int>(2 * lanes + 5, shape), 3.0);
+  std::vector<int> mixed(lanes + 1, 6);
+  mixed.insert(mixed.begin() + 2, -6);
+  expectSolvesAndCounts(mixed, -1.0);
+}
+
+TEST(Banded, RodsThatAreNotWantedStandStill) {
+  Problem p;
+  addRods(p.scene, std::vector<int>(2 * lanes, 6));
+  ASSERT_EQ(p.dofs.setUp(p.scene), PetscErrorCode(0));
+  fill(p, 12);
+  BandedFactor banded(p.dofs);
+  Eigen::VectorXd b = Eigen::VectorXd::Constant(p.dense.rows(), 1.0), all(b.size()), some(b.size());
+  banded.factor(p.system);
+  banded.solve(b.data(), all.data());
+  for (std::size_t r = 0; r < p.system.wanted.size(); ++r) p.system.wanted[r] = r % 3 == 1;
+  banded.factor(p.system);
+  banded.solve(b.data(), some.data());
+  for (std::size_t r = 0; r < p.system.wanted.size(); ++r) {
+    const PetscInt u = p.dofs.unknown(p.dofs.rods()[r].slot(2), 1);
+    EXPECT_NEAR(some[u], p.system.wanted[r] ? all[u] : 0.0, 1e-14);
+  }
+}
+
+TEST(Banded, AShiftOfOneRodIsAddedToItsDiagonal) {
+  Problem p;
+  addRods(p.scene, std::vector<int>(lanes + 1, 6));
+  ASSERT_EQ(p.dofs.setUp(p.scene), PetscErrorCode(0));
+  fill(p, -1);
+  BandedFactor banded(p.dofs);
+  p.system.shift[2] = 20; // more than the sum of the others in any row
+  p.system.shift[lanes] = 20;
+  banded.factor(p.system);
+  for (int r = 0; r <= lanes; ++r) EXPECT_EQ(banded.negativePivots(r) == 0, r == 2 || r == lanes) << r;
 }
 
 TEST(Banded, CountsNeutralMotionsAndStandsStill) {
-  // A free spring chain: its translation costs nothing.
-  const int n = 30;
+  // A free chain of springs along x: its translation costs nothing.
   Problem p;
-  p.start = {0};
-  for (int i = 0; i < n; ++i) {
-    if (i > 0) p.column.push_back(i - 1), p.value.push_back(-1.3);
-    p.column.push_back(i), p.value.push_back((i > 0) * 1.3 + (i + 1 < n) * 1.3);
-    if (i + 1 < n) p.column.push_back(i + 1), p.value.push_back(-1.3);
-    p.start.push_back(PetscInt(p.column.size()));
+  addRods(p.scene, {12});
+  ASSERT_EQ(p.dofs.setUp(p.scene), PetscErrorCode(0));
+  fill(p, 1);
+  p.band.clear(p.dofs.rods()[0]);
+  for (int i = 0; i < 12; ++i) {
+    for (int a = 1; a < slot_size; ++a) p.band.entry(p.dofs.rods()[0], a, 0)[i] = 1;
+    p.band.entry(p.dofs.rods()[0], 0, 0)[i] = 1.3 * ((i > 0) + (i < 11));
+    if (i < 11) p.band.entry(p.dofs.rods()[0], 0, slot_size)[i] = -1.3;
   }
-  BandedCholesky banded;
-  ASSERT_TRUE(banded.analyse(n, p.start.data(), p.column.data()));
-  banded.factor(p.start.data(), p.column.data(), p.value.data());
-  EXPECT_EQ(banded.negativePivots(), 0);
-  EXPECT_EQ(banded.neutralPivots(), 1);
-}
-
-TEST(Banded, RefusesWhatIsNeitherChainNorRing) {
-  // An arrow: the last row meets all others, the first of them too far apart for a border of one ring.
-  std::vector<PetscInt> start{0}, column;
-  const int n = 40;
-  for (int i = 0; i < n; ++i) {
-    column.push_back(i);
-    if (i < 20) column.push_back(i + 20);
-    else column.insert(column.end() - 1, i - 20);
-    start.push_back(PetscInt(column.size()));
-  }
-  BandedCholesky banded;
-  EXPECT_FALSE(banded.analyse(n, start.data(), column.data()));
+  BandedFactor banded(p.dofs);
+  banded.factor(p.system);
+  EXPECT_EQ(banded.negativePivots(0), 0);
+  EXPECT_EQ(banded.neutralPivots(0), 1);
 }
 
 } // namespace
