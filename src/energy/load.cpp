@@ -78,7 +78,7 @@ private:
   Planes full_, force_; ///< forces on vertices [N] at load factor 1, and now
   std::vector<std::vector<Couple>> couples_;
   const Configuration *start_ = nullptr;
-  double factor_ = 0;
+  double factor_ = 1;
 
   /// Symmetric part of the derivative of the gradient of a couple over (e, theta): with g_e = -(M x t)/l and g_theta = -M.t,
   /// d g_e/d e = -[M]x (I - 2 t t')/l^2 ... symmetrised, d g_theta/d e = -(I - t t') M/l and d g_e/d theta = 0.
