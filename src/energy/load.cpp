@@ -8,7 +8,7 @@ namespace {
 /// no potential over large rotations, so it is measured from the last iterate: all that a line search compares starts there.
 class Load final : public Term {
 public:
-  Load(const Scene &scene, const Elements &elements) : elements_(elements), full_(3, elements.slots), force_(full_), couples_(scene.rods.size()) {
+  Load(const Scene &scene, const Elements &elements) : elements_(elements), full_(3, elements.slots), couples_(scene.rods.size()) {
     for (std::size_t r = 0; r < scene.rods.size(); ++r)
       if (scene.rods[r].gravity)
         for (int s = elements.rods[r].first_slot; s < elements.rods[r].vertexEnd(); ++s) full_.setVector(0, s, elements.mass()[s] * scene.gravity);
@@ -17,6 +17,7 @@ public:
       full_.setVector(0, s, full_.vector(0, s) + f.force);
     }
     for (const EdgeMoment &m : scene.moments) couples_[m.rod].push_back({m, elements.rods[m.rod].slot(m.edge), Vec3::Zero(), 0.0});
+    force_ = full_;
   }
 
   void beginStep(const State &, const Configuration &start, const Step &step) override {
