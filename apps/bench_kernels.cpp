@@ -258,7 +258,7 @@ void registerAll() {
   registerKernels<Kernel::derivatives>("derivatives");
   benchmark::RegisterBenchmark("machine/multiply_add", multiplyAdd);
   benchmark::RegisterBenchmark("machine/copy", copyBandwidth)->Unit(benchmark::kMillisecond);
-  const std::vector<std::int64_t> edges{100, 1600, 100000};
+  const std::vector<std::int64_t> edges{100, 400, 1600, 100000};
   for (const std::int64_t n : edges) benchmark::RegisterBenchmark("lapack/factor_and_solve", lapack)->Arg(n)->UseManualTime()->Unit(benchmark::kMicrosecond);
   for (const std::int64_t n : edges) benchmark::RegisterBenchmark("solver/factor_and_solve", solver<true>)->Arg(n)->Unit(benchmark::kMicrosecond);
   for (const std::int64_t n : edges) benchmark::RegisterBenchmark("solver/solve", solver<false>)->Arg(n)->Unit(benchmark::kMicrosecond);
