@@ -247,21 +247,22 @@ template <bool with_factor> void solver(benchmark::State &run) {
 }
 
 template <Kernel kernel> void registerKernels(const std::string &name) {
-  benchmark::RegisterBenchmark((name + "/tan/double").c_str(), cellKernel<kernel, Measure::tan, double>);
-  benchmark::RegisterBenchmark((name + "/tan/pack").c_str(), cellKernel<kernel, Measure::tan, Pack>);
-  benchmark::RegisterBenchmark((name + "/angle/double").c_str(), cellKernel<kernel, Measure::angle, double>);
-  benchmark::RegisterBenchmark((name + "/angle/pack").c_str(), cellKernel<kernel, Measure::angle, Pack>);
+  benchmark::RegisterBenchmark((name + "/tan/double").c_str(), cellKernel<kernel, Measure::tan, double>)->UseRealTime();
+  benchmark::RegisterBenchmark((name + "/tan/pack").c_str(), cellKernel<kernel, Measure::tan, Pack>)->UseRealTime();
+  benchmark::RegisterBenchmark((name + "/angle/double").c_str(), cellKernel<kernel, Measure::angle, double>)->UseRealTime();
+  benchmark::RegisterBenchmark((name + "/angle/pack").c_str(), cellKernel<kernel, Measure::angle, Pack>)->UseRealTime();
 }
 
 void registerAll() {
   registerKernels<Kernel::energy>("energy");
   registerKernels<Kernel::derivatives>("derivatives");
-  benchmark::RegisterBenchmark("machine/multiply_add", multiplyAdd);
-  benchmark::RegisterBenchmark("machine/copy", copyBandwidth)->Unit(benchmark::kMillisecond);
+  benchmark::RegisterBenchmark("machine/multiply_add", multiplyAdd)->UseRealTime();
+  benchmark::RegisterBenchmark("machine/copy", copyBandwidth)->UseRealTime()->Unit(benchmark::kMillisecond);
   const std::vector<std::int64_t> edges{100, 400, 1600, 100000};
   for (const std::int64_t n : edges) benchmark::RegisterBenchmark("lapack/factor_and_solve", lapack)->Arg(n)->UseManualTime()->Unit(benchmark::kMicrosecond);
-  for (const std::int64_t n : edges) benchmark::RegisterBenchmark("solver/factor_and_solve", solver<true>)->Arg(n)->Unit(benchmark::kMicrosecond);
-  for (const std::int64_t n : edges) benchmark::RegisterBenchmark("solver/solve", solver<false>)->Arg(n)->Unit(benchmark::kMicrosecond);
+  for (const std::int64_t n : edges)
+    benchmark::RegisterBenchmark("solver/factor_and_solve", solver<true>)->Arg(n)->UseRealTime()->Unit(benchmark::kMicrosecond);
+  for (const std::int64_t n : edges) benchmark::RegisterBenchmark("solver/solve", solver<false>)->Arg(n)->UseRealTime()->Unit(benchmark::kMicrosecond);
 }
 
 } // namespace

@@ -6,16 +6,16 @@
 namespace tendril::test {
 namespace {
 
-/// Largest ratio of one whole Newton iteration (derivatives, factorisation, line search, everything around) to LAPACK's dpbtrf and dpbtrs: twice the 5.1
+/// Largest ratio of one whole Newton iteration (derivatives, factorisation, line search, everything around) to LAPACK's dpbtrf and dpbtrs: twice the 5.4
 /// that was measured with Debian's reference BLAS (docs/performance.md), so that only a real loss of speed trips it. Another BLAS has another ratio.
-constexpr double most_newton_per_lapack = 2 * 5.1;
+constexpr double most_newton_per_lapack = 2 * 5.4;
 
 TEST(Speed, OfANewtonIterationStaysNearThatOfItsLinearAlgebra) {
 #if !defined(NDEBUG) || defined(__SANITIZE_ADDRESS__)
   GTEST_SKIP() << "says nothing in a debug or sanitizer build";
 #endif
-  constexpr int edges = 400, repeats = 15; // of each, in turn: the fastest of both belong to the same machine, however busy it is
-  const LoopSettings settings = dynamics(5e-3, 0.05);
+  constexpr int edges = 400, repeats = 100; // of one step and of LAPACK in turn, short enough that on a busy machine some are left alone
+  const LoopSettings settings = dynamics(5e-3, 5e-3);
   Simulation simulation;
   EXPECT_PETSC(simulation.setUp(bench::cantilevers(1, edges), settings));
   bench::LapackBand band(edges);
