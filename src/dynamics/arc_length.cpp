@@ -16,7 +16,7 @@ void requireDeadLoads(const Scene &scene) {
     throw SceneError("-continuation arclength needs a load to follow: gravity, a force, a torque or a moment");
 }
 
-ArcLength::ArcLength(NewtonSolver &solver, const LoopSettings &settings)
+ArcLength::ArcLength(StepSolver &solver, const LoopSettings &settings)
     : solver_(solver), settings_(settings), metric_(solver.potential().dofs().makePlanes()), load_derivatives_(solver.potential().dofs()) {
   const IncrementalPotential &potential = solver.potential();
   const Elements &e = potential.elements();
@@ -58,7 +58,7 @@ PetscErrorCode ArcLength::solveLoad(Planes *response) {
   PetscFunctionBeginUser;
   const IncrementalPotential &potential = solver_.potential();
   load_derivatives_.equilibrium.clear();
-  for (int r = 0; r < potential.rods(); ++r) {
+  for (int r = 0; r < potential.all().end; ++r) {
     load_->addDerivatives(potential.iterate(), r, load_derivatives_);
     potential.dofs().fold(potential.elements().rods[r], load_derivatives_.equilibrium);
   }
@@ -70,7 +70,7 @@ PetscErrorCode ArcLength::solveLoad(Planes *response) {
 PetscErrorCode ArcLength::solve(const Planes &gradient, Planes *step) {
   PetscFunctionBeginUser;
   if (step->size() == 0) *step = solver_.potential().dofs().makePlanes();
-  PetscCall(solver_.solveLinear(gradient, *step));
+  PetscCall(solver_.front().solveLinear(gradient, *step));
   for (double &y : *step) y = -y;
   PetscFunctionReturn(0);
 }
@@ -168,7 +168,7 @@ PetscErrorCode ArcLength::step(const State &state, double length, bool *converge
   step.time = step.load_factor = state.time;
   step.mixed = settings_.mixed;
   IncrementalPotential &potential = solver_.potential();
-  potential.beginStep(state, step);
+  solver_.begin(state, step);
   Point direction;
   PetscCall(tangent(&direction));
   if (!obstacle_.empty()) PetscFunctionReturn(0);
@@ -242,7 +242,7 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
   if (!failure_.empty()) PetscFunctionReturn(0);
   Step load;
   load.load_factor = 1;
-  load_->beginStep(state, potential.iterate(), load);
+  for (int r = 0; r < potential.all().end; ++r) load_->beginStep(state, potential.iterate(), load, r);
 
   Point direction;
   PetscCall(tangent(&direction));

@@ -19,7 +19,7 @@ double distance(const State &a, const State &b) {
 
 } // namespace
 
-PetscErrorCode locateCritical(NewtonSolver &solver, const State &stable, const Step &step, CriticalPoint *point, bool *found) {
+PetscErrorCode locateCritical(StepSolver &solver, const State &stable, const Step &step, CriticalPoint *point, bool *found) {
   constexpr int most_solves = 40;
   constexpr double interval = 1e-8;
   // Across a bifurcation the branch moves by about the interval, or by its square root when Newton strays to the branch that leaves.

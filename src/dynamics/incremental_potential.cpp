@@ -31,7 +31,7 @@ using C = Configuration;
 
 IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, const Elements &elements, bool dynamic)
     : scene_(scene), dofs_(dofs), elements_(elements), retraction_(elements, dofs), axial_(scene, elements), terms_(makeTerms(scene, elements, axial_, dynamic)),
-      start_(elements.slots), derivatives_(dofs), current_(elements.rods.size(), false) {
+      start_(elements.slots), derivatives_(dofs), known_(elements.rods.size(), Known::nothing) {
   for (std::size_t r = 0; r < elements.rods.size(); ++r) {
     const RodRange &rod = elements.rods[r];
     double sum = 0, shortest = HUGE_VAL, bending = 0, cell = HUGE_VAL;
@@ -49,99 +49,112 @@ IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, con
     shortest_cell_.push_back(cell);
   }
   load_ = loads(scene, length_);
+  force_scale_.resize(load_.size());
 }
 
 void IncrementalPotential::beginStep(const State &start, const Step &step) {
-  start_state_ = start;
+  start_time_ = start.time;
   step_ = step;
-  setConfiguration(start, scene_, elements_, start.time, start_);
-  iterate_ = start_;
-  axial_.beginStep(start_, step_);
-  for (auto &term : terms_) term->beginStep(start_state_, start_, step_);
+  setSupports(scene_, elements_, start.time, start_);
+  if (iterate_.empty()) iterate_ = start_;
   turnSupports();
-  setForceScales();
   retraction_.setInverseTimeSquared(step.isStatic() ? 0 : 1 / (step.dt * step.dt));
-  std::fill(current_.begin(), current_.end(), false);
+}
+
+void IncrementalPotential::beginRod(const State &start, int r) {
+  setRod(start, elements_, r, start_);
+  iterate_.copyRod(elements_, r, start_);
+  axial_.beginStep(start_, step_, r);
+  for (auto &term : terms_) term->beginStep(start, start_, step_, r);
+  followSupports(r);
+  force_scale_[r] = forceScale(start, r);
+  known_[r] = Known::nothing;
 }
 
 void IncrementalPotential::setLoadFactor(double factor) {
   step_.load_factor = step_.time = factor;
   for (auto &term : terms_) term->setLoadFactor(factor);
-  std::fill(current_.begin(), current_.end(), false);
+  std::fill(known_.begin(), known_.end(), Known::nothing);
 }
 
-/// The force that measures each rod's residual: its loads. A rod without any is measured by the force that deforms it,
+/// The force that measures a rod's residual: its loads. A rod without any is measured by the force that deforms it,
 /// the smallest of EI/L^2, GJ/L^2 and 1e-4 EA, or, where that is smaller, by the force that would stop it within the step.
-void IncrementalPotential::setForceScales() {
-  force_scale_ = load_;
-  for (std::size_t r = 0; r < load_.size(); ++r) {
-    if (load_[r] > 0) continue;
-    const Material &m = scene_.rods[r].material;
-    const RodRange &rod = elements_.rods[r];
-    double softest = 1e-4 * m.axial_stiffness * length_[r] * length_[r];
-    if (!m.isCable())
-      for (const double k : {m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness})
-        if (k > 0) softest = std::min(softest, k);
-    force_scale_[r] = softest / (length_[r] * length_[r]);
-    if (step_.isStatic()) continue;
-    double momentum = 0;
-    for (int i = 0; i < rod.vertices; ++i) momentum += elements_.mass()[rod.slot(i)] * start_state_.velocity[rod.first_vertex + i].norm();
-    if (momentum > 0) force_scale_[r] = std::min(force_scale_[r], momentum / step_.dt);
-  }
+double IncrementalPotential::forceScale(const State &start, int r) const {
+  if (load_[r] > 0) return load_[r];
+  const Material &m = scene_.rods[r].material;
+  const RodRange &rod = elements_.rods[r];
+  double softest = 1e-4 * m.axial_stiffness * length_[r] * length_[r];
+  if (!m.isCable())
+    for (const double k : {m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness})
+      if (k > 0) softest = std::min(softest, k);
+  const double scale = softest / (length_[r] * length_[r]);
+  if (step_.isStatic()) return scale;
+  double momentum = 0;
+  for (int i = 0; i < rod.vertices; ++i) momentum += elements_.mass()[rod.slot(i)] * start.velocity[rod.first_vertex + i].norm();
+  return momentum > 0 ? std::min(scale, momentum / step_.dt) : scale;
 }
 
-/// Supports' frames to the end of the step; whole turns of the twist angles follow.
+/// Supports' frames to the end of the step.
 void IncrementalPotential::turnSupports() {
   beyond_barrier_ = false;
-  std::vector<std::pair<int, double>> turned; // slot of the frame, angle
+  turned_.clear();
   for (std::size_t s = 0; s < scene_.supports.size(); ++s) {
     const int slot = elements_.support_slot[s];
     const Motion &motion = scene_.supports[s].motion;
     if (slot < 0 || !motion.moves()) continue;
-    turned.emplace_back(slot, 0.0);
+    Turned turned{scene_.supports[s].rod, slot, 0.0, start_.frameAt(slot)};
     // In parts of less than half a radian, so that whole turns within the step are counted.
-    const int parts = 1 + int(2 * (motion.rotationVectorAt(step_.time) - motion.rotationVectorAt(start_state_.time)).norm());
+    const int parts = 1 + int(2 * (motion.rotationVectorAt(step_.time) - motion.rotationVectorAt(start_time_)).norm());
     for (int k = 1; k <= parts; ++k) {
-      const double time = k == parts ? step_.time : start_state_.time + (step_.time - start_state_.time) * k / parts;
+      const double time = k == parts ? step_.time : start_time_ + (step_.time - start_time_) * k / parts;
       const Frame now = supportFrame(scene_.supports[s], time);
-      turned.back().second += halfAngleBetween(iterate_.frameAt(slot), now).angle();
-      iterate_.setFrame(slot, now);
+      turned.angle += halfAngleBetween(turned.end, now).angle();
+      turned.end = now;
     }
+    turned_.push_back(turned);
   }
-  if (turned.empty()) return;
-  auto turning = [&](int frame) {
-    for (const auto &[slot, angle] : turned)
-      if (slot == frame) return angle;
-    return 0.0;
-  };
-  for (int r = 0; r < rods(); ++r)
-    forCells(elements_, r, [&]<class T>(const LooseCell &cells, int count) {
-      for (int l = 0; l < count; ++l) {
-        const LooseCell cell{cells.slot + l, cells.frame0 + l, cells.frame1 + l, cells.vertex + l};
-        double &twist = iterate_[C::twist][cell.slot], &turns = iterate_[C::turns][cell.slot];
-        const double expected = twist + turning(cell.frame1) - turning(cell.frame0);
-        const double principal = halfAngleBetween(iterate_.frameAt(cell.frame0), iterate_.frameAt(cell.frame1)).angle();
-        turns = 2 * pi * std::round((expected - principal) / (2 * pi));
-        twist = principal + turns;
-        beyond_barrier_ = beyond_barrier_ || (elements_.measure[r] == Measure::tan && turns != 0);
-      }
-    });
 }
 
-bool IncrementalPotential::remainingMotion(Planes &increment) const {
-  if (increment.size() == 0) increment = dofs_.makePlanes();
-  increment.clear();
+/// Turned frames of a rod's supports; whole turns of its twist angles follow.
+void IncrementalPotential::followSupports(int r) {
+  bool any = false;
+  for (const Turned &turned : turned_) {
+    if (turned.rod != r) continue;
+    iterate_.setFrame(turned.slot, turned.end);
+    any = true;
+  }
+  if (!any) return;
+  auto turning = [&](int frame) {
+    for (const Turned &turned : turned_)
+      if (turned.slot == frame) return turned.angle;
+    return 0.0;
+  };
+  forCells(elements_, r, [&]<class T>(const LooseCell &cells, int count) {
+    for (int l = 0; l < count; ++l) {
+      const LooseCell cell{cells.slot + l, cells.frame0 + l, cells.frame1 + l, cells.vertex + l};
+      double &twist = iterate_[C::twist][cell.slot], &turns = iterate_[C::turns][cell.slot];
+      const double expected = twist + turning(cell.frame1) - turning(cell.frame0);
+      const double principal = halfAngleBetween(iterate_.frameAt(cell.frame0), iterate_.frameAt(cell.frame1)).angle();
+      turns = 2 * pi * std::round((expected - principal) / (2 * pi));
+      twist = principal + turns;
+      beyond_barrier_ = beyond_barrier_ || (elements_.measure[r] == Measure::tan && turns != 0);
+    }
+  });
+}
+
+bool IncrementalPotential::remainingMotion(RodSet rods, Planes &increment) const {
   bool any = false;
   for (const Support &s : scene_.supports) {
-    if (!s.holdsPosition() || !s.motion.moves()) continue;
-    const int slot = elements_.rods[s.rod].slot(s.vertex);
+    if (s.rod < rods.begin || s.rod >= rods.end || !s.holdsPosition() || !s.motion.moves()) continue;
+    const RodRange &rod = elements_.rods[s.rod];
+    const int slot = rod.slot(s.vertex);
     const Vec3 target = scene_.rods[s.rod].position[s.vertex] + s.motion.displacementAt(step_.time);
-    const Vec3 d = target - iterate_.positionAt(slot);
-    if (d.norm() <= 4 * epsilon * target.norm()) continue;
-    any = true;
+    Vec3 d = target - iterate_.positionAt(slot);
+    if (d.norm() <= 4 * epsilon * target.norm()) d.setZero();
+    any = any || !d.isZero(0);
     increment.setVector(0, slot, d);
+    dofs_.copyBehindRing(rod, increment);
   }
-  if (any) dofs_.copyBehindRings(increment);
   return any;
 }
 
@@ -196,9 +209,9 @@ IncrementalPotential::RodEnergy IncrementalPotential::rodEnergy(const Configurat
   return result;
 }
 
-double IncrementalPotential::energy(const Configuration &configuration) const {
+double IncrementalPotential::energy(const Configuration &configuration, RodSet rods) const {
   double sum = 0;
-  for (int r = 0; r < rods(); ++r) sum += rodEnergy(configuration, r).value;
+  for (int r = rods.begin; r < rods.end; ++r) sum += rodEnergy(configuration, r).value;
   return sum;
 }
 
@@ -207,26 +220,31 @@ void IncrementalPotential::assembleRod(int r, HessianKind hessian) {
   Derivatives &d = derivatives_;
   for (int a = 0; a < slot_size; ++a)
     for (Planes *p : {&d.gradient, &d.equilibrium}) std::fill((*p)[a] + rod.first_slot - 1, (*p)[a] + rod.first_slot + rod.slots - 1, 0.0);
-  d.band.clear(rod);
+  if (hessian != HessianKind::none) d.band.clear(rod);
   for (const auto &term : terms_) term->addDerivatives(iterate_, r, d, hessian);
   for (int a = 0; a < slot_size; ++a)
     for (int s = rod.first_slot; s < rod.vertexEnd() + 2; s += lanes) addTo(d.gradient[a] + s, read<Pack>(d.equilibrium[a] + s));
   dofs_.fold(rod, d.gradient);
   dofs_.fold(rod, d.equilibrium);
-  dofs_.fold(rod, d.band);
-  current_[r] = true;
+  if (hessian != HessianKind::none) dofs_.fold(rod, d.band);
+  known_[r] = hessian == HessianKind::none ? Known::gradient : Known::all;
 }
 
-const Derivatives &IncrementalPotential::derivatives() {
-  for (int r = 0; r < rods(); ++r)
-    if (!current_[r]) assembleRod(r, step_.hessian);
+const Derivatives &IncrementalPotential::derivatives(RodSet rods) {
+  for (int r = rods.begin; r < rods.end; ++r)
+    if (known_[r] != Known::all) assembleRod(r, step_.hessian);
   return derivatives_;
 }
 
-void IncrementalPotential::resetAxialForces() {
-  for (const RodRange &rod : elements_.rods)
-    for (int i = rod.first_slot; i < rod.edgeEnd(); ++i) iterate_[C::axial_force][i] = axial_.stiffness()[i] * (iterate_[C::strain][i] - axial_.rest()[i]);
-  std::fill(current_.begin(), current_.end(), false);
+const Derivatives &IncrementalPotential::gradient(int r) {
+  if (known_[r] == Known::nothing) assembleRod(r, HessianKind::none);
+  return derivatives_;
+}
+
+void IncrementalPotential::resetAxialForces(int r) {
+  const RodRange &rod = elements_.rods[r];
+  for (int i = rod.first_slot; i < rod.edgeEnd(); ++i) iterate_[C::axial_force][i] = axial_.stiffness()[i] * (iterate_[C::strain][i] - axial_.rest()[i]);
+  known_[r] = Known::nothing;
 }
 
 bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r, RetractionKind kind, Configuration &trial) {
@@ -252,7 +270,7 @@ bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r,
 }
 
 bool IncrementalPotential::tryMove(const Planes &increment, double scale, Configuration &trial) {
-  for (int r = 0; r < rods(); ++r)
+  for (int r = 0; r < all().end; ++r)
     if (!tryMove(increment, scale, r, trial)) return false;
   return true;
 }
@@ -260,16 +278,17 @@ bool IncrementalPotential::tryMove(const Planes &increment, double scale, Config
 void IncrementalPotential::accept(const Configuration &trial, int r) {
   iterate_.copyRod(elements_, r, trial);
   for (auto &term : terms_) term->moveIterate(iterate_, r);
-  current_[r] = false;
+  known_[r] = Known::nothing;
 }
 
 void IncrementalPotential::accept(const Configuration &trial) {
-  for (int r = 0; r < rods(); ++r) accept(trial, r);
+  for (int r = 0; r < all().end; ++r) accept(trial, r);
 }
 
-void IncrementalPotential::coordinates(Planes &x) const {
+void IncrementalPotential::coordinates(Planes &x, RodSet rods) const {
   if (x.size() == 0) x = dofs_.makePlanes();
-  for (const RodRange &rod : elements_.rods) {
+  for (int r = rods.begin; r < rods.end; ++r) {
+    const RodRange &rod = elements_.rods[r];
     for (int a = 0; a < 3; ++a) {
       const double *now = iterate_[C::Plane(C::position + a)], *before = start_[C::Plane(C::position + a)];
       for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) x[a][s] = now[s] - before[s];
@@ -278,31 +297,28 @@ void IncrementalPotential::coordinates(Planes &x) const {
   }
 }
 
-void IncrementalPotential::moveTo(const Planes &x) {
-  Planes increment, now;
-  coordinates(now);
-  increment = now;
-  bool moves = false;
-  for (const RodRange &rod : elements_.rods)
+void IncrementalPotential::moveTo(const Planes &x, RodSet rods) {
+  Planes now = dofs_.makePlanes(), increment = now;
+  coordinates(now, rods);
+  Configuration trial;
+  for (int r = rods.begin; r < rods.end; ++r) {
+    const RodRange &rod = elements_.rods[r];
+    bool moves = false;
     for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
       for (int a = 0; a < slot_size; ++a) {
         increment[a][s] = dofs_.unknown(s, a) >= 0 ? x[a][s] - now[a][s] : 0.0;
         moves = moves || increment[a][s] != 0;
       }
-  if (!moves) return;
-  dofs_.copyBehindRings(increment);
-  Configuration trial;
-  for (int r = 0; r < rods(); ++r)
-    if (!tryMove(increment, 1.0, r, RetractionKind::additive, trial)) return;
-  accept(trial);
+    dofs_.copyBehindRing(rod, increment);
+    if (moves && tryMove(increment, 1.0, r, RetractionKind::additive, trial)) accept(trial, r);
+  }
 }
 
 IncrementalPotential::Residual IncrementalPotential::residual(int r) {
   using std::abs;
   const RodRange &rod = elements_.rods[r];
   const Material &m = scene_.rods[r].material;
-  if (!current_[r]) assembleRod(r, step_.hessian);
-  const Planes &out_of_balance = derivatives_.equilibrium;
+  const Planes &out_of_balance = gradient(r).equilibrium;
   Pack forces(0.0), moments(0.0), tension(0.0), shortest(shortest_[r]), error(0.0);
   for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) {
     forces += read<Pack>(elements_.freedom() + s) * readVector<Pack>(out_of_balance, 0, s).squaredNorm();
@@ -337,29 +353,33 @@ void IncrementalPotential::Residual::include(const Residual &other) {
 
 IncrementalPotential::Residual IncrementalPotential::residual() {
   Residual worst;
-  for (int r = 0; r < rods(); ++r) worst.include(residual(r));
+  for (int r = 0; r < all().end; ++r) worst.include(residual(r));
   return worst;
 }
 
-void IncrementalPotential::commit(State &state) const {
+[[gnu::flatten]] void IncrementalPotential::commit(State &state) const {
   state.time = step_.time;
   ++state.step;
   for (std::size_t n = 0; n < state.turns.size(); ++n) state.turns[n] = iterate_[C::turns][elements_.cell_slot[n]];
+  const double rate = step_.isStatic() ? 0 : 1 / step_.dt;
   for (const RodRange &rod : elements_.rods) {
     for (int i = 0; i < rod.vertices; ++i) {
       const int v = rod.first_vertex + i;
       const Vec3 x = iterate_.positionAt(rod.slot(i));
-      if (!step_.isStatic()) state.velocity[v] = (x - start_.positionAt(rod.slot(i))) / step_.dt;
+      if (!step_.isStatic()) state.velocity[v] = (x - start_.positionAt(rod.slot(i))) * rate;
       state.position[v] = x;
     }
-    for (int i = 0; i < rod.edges; ++i) {
-      const int slot = rod.slot(i), e = rod.first_edge + i;
-      const Frame f = iterate_.frameAt(slot);
-      state.axial_force[e] = iterate_[C::axial_force][slot];
-      state.director[e] = orthonormalised(f.director, f.tangent);
-      if (step_.isStatic()) continue;
-      const double principal = twistIncrement(start_.frameAt(slot), f);
-      state.twist_rate[e] = (principal + 2 * pi * std::round((iterate_[C::spin][slot] - principal) / (2 * pi))) / step_.dt;
+    for (int i = 0; i < rod.edges; i += lanes) {
+      const int slot = rod.slot(i), live = std::min(lanes, rod.edges - i);
+      const FrameOf<Pack> f = iterate_.frames<Pack>(slot);
+      const Vector3<Pack> d = orthonormalised<Pack>(f.director, f.tangent);
+      const Pack spun = step_.isStatic() ? Pack(0.0) : spinOver(start_, iterate_, slot).total * Pack(rate);
+      for (int l = 0; l < live; ++l) {
+        const int e = rod.first_edge + i + l;
+        state.director[e] = Vec3(d[0][l], d[1][l], d[2][l]);
+        state.axial_force[e] = iterate_[C::axial_force][slot + l];
+        if (!step_.isStatic()) state.twist_rate[e] = spun[l];
+      }
     }
   }
 }

@@ -78,43 +78,46 @@ Frame supportFrame(const Support &support, double motion_time) {
   return {r * support.frame.tangent, r * support.frame.director, 1.0};
 }
 
-void setConfiguration(const State &state, const Scene &scene, const Elements &elements, double motion_time, Configuration &c) {
+void setSupports(const Scene &scene, const Elements &elements, double motion_time, Configuration &c) {
   for (std::size_t s = 0; s < scene.supports.size(); ++s)
     if (elements.support_slot[s] >= 0) c.setFrame(elements.support_slot[s], supportFrame(scene.supports[s], motion_time));
-  for (std::size_t n = 0; n < state.turns.size(); ++n) c[Configuration::turns][elements.cell_slot[n]] = state.turns[n];
-  for (std::size_t r = 0; r < elements.rods.size(); ++r) {
-    const RodRange &rod = elements.rods[r];
-    for (int i = 0; i < rod.vertices; ++i)
-      for (int a = 0; a < 3; ++a) c[Configuration::Plane(Configuration::position + a)][rod.slot(i)] = state.position[rod.first_vertex + i][a];
-    c.closeRing(rod);
-    for (int i = 0; i < rod.edges; ++i) {
-      for (int a = 0; a < 3; ++a) c[Configuration::Plane(Configuration::director + a)][rod.slot(i)] = state.director[rod.first_edge + i][a];
-      c[Configuration::axial_force][rod.slot(i)] = state.axial_force[rod.first_edge + i];
-      c[Configuration::spin][rod.slot(i)] = 0;
-    }
-    for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
-      using std::sqrt;
-      const Pack::mask_type live = firstLanes(rod.edgeEnd() - s);
-      const Vector3<Pack> e = c.positions<Pack>(s + 1) - c.positions<Pack>(s);
-      const Pack l = sqrt(e.squaredNorm()), length = select(live, l, read<Pack>(c[Configuration::length] + s));
-      for (int a = 0; a < 3; ++a) {
-        double *t = c[Configuration::Plane(Configuration::tangent + a)] + s;
-        write(t, select(live, Pack(e[a] / l), read<Pack>(t)));
-      }
-      write(c[Configuration::length] + s, length);
-      write(c[Configuration::strain] + s, axialStrain<Pack>(length, read<Pack>(elements.inverseRestLength() + s)));
-    }
-    c.closeRing(rod);
-    forCells(elements, int(r), [&]<class T>(const LooseCell &cell, int count) {
-      const auto [f0, f1] = cellFrames<T>(c, cell, count);
-      write(c[Configuration::twist] + cell.slot, T(halfAngleBetween(f0, f1).angle() + read<T>(c[Configuration::turns] + cell.slot)));
-    });
+}
+
+[[gnu::flatten]] void setRod(const State &state, const Elements &elements, int r, Configuration &c) {
+  using C = Configuration;
+  using std::sqrt;
+  const RodRange &rod = elements.rods[r];
+  for (int n = elements.rod_cells[r]; n < elements.rod_cells[r + 1]; ++n) c[C::turns][elements.cell_slot[n]] = state.turns[n];
+  for (int i = 0; i < rod.vertices; ++i)
+    for (int a = 0; a < 3; ++a) c[C::Plane(C::position + a)][rod.slot(i)] = state.position[rod.first_vertex + i][a];
+  c.closeRing(rod);
+  for (int i = 0; i < rod.edges; ++i) {
+    for (int a = 0; a < 3; ++a) c[C::Plane(C::director + a)][rod.slot(i)] = state.director[rod.first_edge + i][a];
+    c[C::axial_force][rod.slot(i)] = state.axial_force[rod.first_edge + i];
+    c[C::spin][rod.slot(i)] = 0;
   }
+  for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
+    const Pack::mask_type live = firstLanes(rod.edgeEnd() - s);
+    const Vector3<Pack> e = c.positions<Pack>(s + 1) - c.positions<Pack>(s);
+    const Pack l = sqrt(e.squaredNorm()), length = select(live, l, read<Pack>(c[C::length] + s));
+    for (int a = 0; a < 3; ++a) {
+      double *t = c[C::Plane(C::tangent + a)] + s;
+      write(t, select(live, Pack(e[a] / l), read<Pack>(t)));
+    }
+    write(c[C::length] + s, length);
+    write(c[C::strain] + s, axialStrain<Pack>(length, read<Pack>(elements.inverseRestLength() + s)));
+  }
+  c.closeRing(rod);
+  forCells(elements, r, [&]<class T>(const LooseCell &cell, int count) {
+    const auto frames = cellFrames<T>(c, cell, count);
+    write(c[C::twist] + cell.slot, T(halfAngleBetween(frames[0], frames[1]).angle() + read<T>(c[C::turns] + cell.slot)));
+  });
 }
 
 Configuration configurationOf(const State &state, const Scene &scene, const Elements &elements, double motion_time) {
   Configuration c(elements.slots);
-  setConfiguration(state, scene, elements, motion_time, c);
+  setSupports(scene, elements, motion_time, c);
+  for (std::size_t r = 0; r < elements.rods.size(); ++r) setRod(state, elements, int(r), c);
   return c;
 }
 

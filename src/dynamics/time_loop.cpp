@@ -79,7 +79,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     Diagnostics row;
     row.time = state.time;
     row.dt = h;
-    row.energy = energyBudget(potential.scene(), potential.elements(), state, settings_.dynamic ? 1 : state.time);
+    row.energy = energyBudget(potential.scene(), potential.elements(), state, potential.iterate(), settings_.dynamic ? 1 : state.time);
     row.dissipated = before.total() - row.energy.total();
     before = row.energy;
     row.newton_iterations = report.iterations;

@@ -10,19 +10,17 @@ public:
 
   /// Dissipation proportional to stiffness is a second quadratic in the same strains: stiffness k and rest r with damping ratio
   /// q = beta/dt around the strain s at the start combine into stiffness k (1 + q) and rest (r + q s)/(1 + q).
-  void beginStep(const State &, const Configuration &start, const Step &step) override {
-    for (std::size_t r = 0; r < scene_.rods.size(); ++r) {
-      const double beta = scene_.rods[r].material.stiffness_damping_coefficient;
-      if (beta == 0) continue;
-      const double q = step.isStatic() ? 0 : beta / step.dt;
-      forCells(elements_, int(r), [&]<class T>(const LooseCell &cell, int count) {
-        const std::array<T, 3> s = presentStrain<T>(elements_, start, int(r), cell, count);
-        for (int k = 0; k < 3; ++k) {
-          write(cells_[cell_stiffness + k] + cell.slot, T(read<T>(elements_.cells()[cell_stiffness + k] + cell.slot) * T(1 + q)));
-          write(cells_[cell_rest + k] + cell.slot, T((read<T>(elements_.cells()[cell_rest + k] + cell.slot) + T(q) * s[k]) / T(1 + q)));
-        }
-      });
-    }
+  void beginStep(const State &, const Configuration &start, const Step &step, int r) override {
+    const double beta = scene_.rods[r].material.stiffness_damping_coefficient;
+    if (beta == 0) return;
+    const double q = step.isStatic() ? 0 : beta / step.dt;
+    forCells(elements_, r, [&]<class T>(const LooseCell &cell, int count) {
+      const std::array<T, 3> s = presentStrain<T>(elements_, start, r, cell, count);
+      for (int k = 0; k < 3; ++k) {
+        write(cells_[cell_stiffness + k] + cell.slot, T(read<T>(elements_.cells()[cell_stiffness + k] + cell.slot) * T(1 + q)));
+        write(cells_[cell_rest + k] + cell.slot, T((read<T>(elements_.cells()[cell_rest + k] + cell.slot) + T(q) * s[k]) / T(1 + q)));
+      }
+    });
   }
 
   double energy(const Configuration &configuration, int rod) const override {
@@ -59,7 +57,13 @@ private:
     forCells(elements_, rod, [&]<class T>(const LooseCell &cell, int count) {
       const auto [f0, f1] = cellFrames<T>(configuration, cell, count);
       CellOf<T> constants = cellOf<T>(cells_, configuration, cell.slot);
+      const int first = cell.vertex - 1;
       CellDerivatives<T> d;
+      if (hessian == HessianKind::none) {
+        d.gradient = cellGradient<measure>(f0, f1, constants);
+        for (int r = 0; r < cell_size; ++r) addTo(out.equilibrium[r % slot_size] + first + r / slot_size, d.gradient[r]);
+        return;
+      }
       cellDerivatives<measure>(f0, f1, constants, d);
       if (hessian == HessianKind::gauss_newton) { // the Hessian the cell would have if it were at rest as it is
         const std::array<T, cell_size> gradient = d.gradient;
@@ -67,7 +71,6 @@ private:
         cellDerivatives<measure>(f0, f1, constants, d);
         d.gradient = gradient;
       }
-      const int first = cell.vertex - 1;
       for (int r = 0; r < cell_size; ++r) addTo(out.equilibrium[r % slot_size] + first + r / slot_size, d.gradient[r]);
       for (int r = 0, k = 0; r < cell_size; ++r)
         for (int c = 0; c < cell_size - r; ++c, ++k) addTo(entry[r % slot_size * band_width + c] + first + r / slot_size, d.hessian[k]);

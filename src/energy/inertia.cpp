@@ -10,17 +10,15 @@ public:
   Inertia(const Scene &scene, const Elements &elements) : scene_(scene), elements_(elements), predicted_(slot_size, elements.slots), weight_(scene.rods.size()) {}
 
   /// m/(2 dt^2) |x - x_n - dt v_n|^2 + alpha m/(2 dt) |x - x_n|^2 as one quadratic; the same for the twist increment.
-  void beginStep(const State &state, const Configuration &start, const Step &step) override {
+  void beginStep(const State &state, const Configuration &start, const Step &step, int r) override {
     start_ = &start;
-    for (std::size_t r = 0; r < elements_.rods.size(); ++r) {
-      const RodRange &rod = elements_.rods[r];
-      const double alpha = scene_.rods[r].material.mass_damping_coefficient;
-      weight_[r] = 1 / (step.dt * step.dt) + alpha / step.dt;
-      const double reach = step.dt / (1 + alpha * step.dt);
-      for (int i = 0; i < rod.vertices; ++i)
-        for (int a = 0; a < 3; ++a) predicted_[a][rod.slot(i)] = state.position[rod.first_vertex + i][a] + reach * state.velocity[rod.first_vertex + i][a];
-      for (int i = 0; i < rod.edges; ++i) predicted_[3][rod.slot(i)] = reach * state.twist_rate[rod.first_edge + i];
-    }
+    const RodRange &rod = elements_.rods[r];
+    const double alpha = scene_.rods[r].material.mass_damping_coefficient;
+    weight_[r] = 1 / (step.dt * step.dt) + alpha / step.dt;
+    const double reach = step.dt / (1 + alpha * step.dt);
+    for (int i = 0; i < rod.vertices; ++i)
+      for (int a = 0; a < 3; ++a) predicted_[a][rod.slot(i)] = state.position[rod.first_vertex + i][a] + reach * state.velocity[rod.first_vertex + i][a];
+    for (int i = 0; i < rod.edges; ++i) predicted_[3][rod.slot(i)] = reach * state.twist_rate[rod.first_edge + i];
   }
 
   [[gnu::flatten]] double energy(const Configuration &c, int r) const override {
@@ -30,13 +28,13 @@ public:
       total += read<Pack>(elements_.mass() + s) * (c.positions<Pack>(s) - readVector<Pack>(predicted_, 0, s)).squaredNorm();
     if (rod.twist)
       for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
-        const Pack d = spinOver(c, s)[0] - read<Pack>(predicted_[3] + s);
+        const Pack d = spinOver(*start_, c, s).total - read<Pack>(predicted_[3] + s);
         total += read<Pack>(elements_.twistMass() + s) * d * d;
       }
     return 0.5 * weight_[r] * reduce(total);
   }
 
-  [[gnu::flatten]] void addDerivatives(const Configuration &c, int r, Derivatives &out, HessianKind) const override {
+  [[gnu::flatten]] void addDerivatives(const Configuration &c, int r, Derivatives &out, HessianKind hessian) const override {
     const RodRange &rod = elements_.rods[r];
     std::array<double *, slot_entries> entry;
     for (int e = 0; e < slot_entries; ++e) entry[e] = out.band.entry(rod, e / band_width, e % band_width) - rod.first_slot;
@@ -44,20 +42,22 @@ public:
       const Pack w = read<Pack>(elements_.mass() + s) * Pack(weight_[r]);
       for (int a = 0; a < 3; ++a) {
         addTo<Pack>(out.equilibrium[a] + s, w * (read<Pack>(c[Configuration::Plane(Configuration::position + a)] + s) - read<Pack>(predicted_[a] + s)));
-        addTo(entry[a * band_width] + s, w);
+        if (hessian != HessianKind::none) addTo(entry[a * band_width] + s, w);
       }
     }
     if (!rod.twist) return;
     for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
-      // Whole turns by continuity: the target is moved by them instead of the angle.
-      const Pack target = read<Pack>(predicted_[3] + s) - spinOver(c, s)[1];
-      const auto d = twistInertia<Pack>(start_->frames<Pack>(s), c.frames<Pack>(s), Pack(weight_[r]) * read<Pack>(elements_.twistMass() + s), target);
+      const Pack difference = spinOver(*start_, c, s).total - read<Pack>(predicted_[3] + s);
+      const auto d = twistInertia<Pack>(start_->frames<Pack>(s), c.frames<Pack>(s), Pack(weight_[r]) * read<Pack>(elements_.twistMass() + s), difference);
       addTo(out.equilibrium[3] + s, d.gradient[3]);
-      addTo(entry[3 * band_width] + s, d.hessian[9]);
-      int k = 0;
       for (int a = 0; a < 3; ++a) {
         addTo<Pack>(out.equilibrium[a] + s, -d.gradient[a]);
         addTo(out.equilibrium[a] + s + 1, d.gradient[a]);
+      }
+      if (hessian == HessianKind::none) continue;
+      addTo(entry[3 * band_width] + s, d.hessian[9]);
+      int k = 0;
+      for (int a = 0; a < 3; ++a) {
         for (int b = a; b < 3; ++b, ++k) {
           addTo(entry[a * band_width + b - a] + s, d.hessian[k]);
           addTo(entry[a * band_width + b - a] + s + 1, d.hessian[k]);
@@ -77,13 +77,6 @@ private:
   const Configuration *start_ = nullptr;
   Planes predicted_; ///< positions, and twists since the start
   std::vector<double> weight_;
-
-  /// Twist of edges over the step, whole turns by continuity with the sum of the retractions; and those turns alone.
-  std::array<Pack, 2> spinOver(const Configuration &c, int s) const {
-    const Pack principal = twistIncrement(start_->frames<Pack>(s), c.frames<Pack>(s));
-    const Pack turns = 2 * pi * round((read<Pack>(c[Configuration::spin] + s) - principal) * Pack(0.5 / pi));
-    return {principal + turns, turns};
-  }
 };
 
 } // namespace

@@ -20,10 +20,10 @@ public:
     force_ = full_;
   }
 
-  void beginStep(const State &, const Configuration &start, const Step &step) override {
+  void beginStep(const State &, const Configuration &start, const Step &step, int rod) override {
     start_ = &start;
     setLoadFactor(step.load_factor);
-    for (std::size_t r = 0; r < couples_.size(); ++r) moveIterate(start, int(r));
+    moveIterate(start, rod);
   }
 
   void moveIterate(const Configuration &iterate, int rod) override {
@@ -53,7 +53,7 @@ public:
     return sum;
   }
 
-  void addDerivatives(const Configuration &c, int r, Derivatives &out, HessianKind) const override {
+  void addDerivatives(const Configuration &c, int r, Derivatives &out, HessianKind hessian) const override {
     const RodRange &rod = elements_.rods[r];
     for (int a = 0; a < 3; ++a)
       for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) addTo<Pack>(out.equilibrium[a] + s, -read<Pack>(force_[a] + s));
@@ -65,7 +65,7 @@ public:
         out.equilibrium[a][m.slot] += pair[a];
         out.equilibrium[a][m.slot + 1] -= pair[a];
       }
-      addCoupleHessian(factor_ * m.moment, f, rod, m.slot - rod.first_slot, out.band);
+      if (hessian != HessianKind::none) addCoupleHessian(factor_ * m.moment, f, rod, m.slot - rod.first_slot, out.band);
     }
   }
 

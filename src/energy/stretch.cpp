@@ -9,7 +9,7 @@ class Stretch final : public Term {
 public:
   Stretch(const Elements &elements, const AxialLaw &law) : elements_(elements), law_(law) {}
 
-  void beginStep(const State &, const Configuration &, const Step &step) override { mixed_ = step.mixed; }
+  void beginStep(const State &, const Configuration &, const Step &step, int) override { mixed_ = step.mixed; }
 
   double energy(const Configuration &configuration, int r) const override {
     const RodRange &rod = elements_.rods[r];
@@ -33,12 +33,15 @@ public:
       const Pack force = select(live, mixed_ ? read<Pack>(configuration[Configuration::axial_force] + i) : primal, Pack(0.0));
       const FrameOf<Pack> f = configuration.frames<Pack>(i);
       const Vector3<Pack> e = stretchGradient(f, force, inverse), g = stretchGradient<Pack>(f, select(live, primal - force, Pack(0.0)), inverse);
-      const Matrix3<Pack> h = stretchHessian<Pack>(f, stiffness, hessian == HessianKind::exact ? force : max(force, Pack(0.0)), inverse);
       for (int a = 0; a < 3; ++a) {
         addTo<Pack>(out.equilibrium[a] + i, -e[a]);
         addTo(out.equilibrium[a] + i + 1, e[a]);
         addTo<Pack>(out.gradient[a] + i, -g[a]);
         addTo(out.gradient[a] + i + 1, g[a]);
+      }
+      if (hessian == HessianKind::none) continue;
+      const Matrix3<Pack> h = stretchHessian<Pack>(f, stiffness, hessian == HessianKind::exact ? force : max(force, Pack(0.0)), inverse);
+      for (int a = 0; a < 3; ++a) {
         for (int b = a; b < 3; ++b) {
           addTo(entry[a][b - a] + i, h(a, b));
           addTo(entry[a][b - a] + i + 1, h(a, b));
@@ -61,16 +64,14 @@ AxialLaw::AxialLaw(const Scene &scene, const Elements &elements) : scene_(scene)
 }
 
 /// Dissipation as in the bending term: a second quadratic around the strain at the start.
-void AxialLaw::beginStep(const Configuration &start, const Step &step) {
-  for (std::size_t r = 0; r < scene_.rods.size(); ++r) {
-    const double beta = scene_.rods[r].material.stiffness_damping_coefficient;
-    if (beta == 0) continue;
-    const double q = step.isStatic() ? 0 : beta / step.dt;
-    const RodRange &rod = elements_.rods[r];
-    for (int i = rod.first_slot; i < rod.edgeEnd(); ++i) {
-      planes_[0][i] = elements_.axialStiffness()[i] * (1 + q);
-      planes_[1][i] = q / (1 + q) * start[Configuration::strain][i];
-    }
+void AxialLaw::beginStep(const Configuration &start, const Step &step, int r) {
+  const double beta = scene_.rods[r].material.stiffness_damping_coefficient;
+  if (beta == 0) return;
+  const double q = step.isStatic() ? 0 : beta / step.dt;
+  const RodRange &rod = elements_.rods[r];
+  for (int i = rod.first_slot; i < rod.edgeEnd(); ++i) {
+    planes_[0][i] = elements_.axialStiffness()[i] * (1 + q);
+    planes_[1][i] = q / (1 + q) * start[Configuration::strain][i];
   }
 }
 

@@ -2,7 +2,7 @@
 
 #include <petscdmshell.h>
 
-#include <cstring>
+#include <algorithm>
 
 namespace tendril {
 namespace {
@@ -76,6 +76,7 @@ PetscErrorCode DofMap::createSection(PetscSection *section) const {
 PetscErrorCode DofMap::setUp(const Scene &scene) {
   PetscFunctionBeginUser;
   rods_.clear();
+  unknown_begin_.clear();
   vertices_ = edges_ = 0;
   slots_ = lanes; // room for the frame before the first rod
   for (const Rod &rod : scene.rods) {
@@ -101,8 +102,9 @@ PetscErrorCode DofMap::setUp(const Scene &scene) {
   PetscCall(PetscSectionGetConstrainedStorageSize(global, &unknowns_));
 
   unknown_.assign(std::size_t(slots_) * slot_size, -1);
-  PetscInt point = 0;
-  for (const RodRange &rod : rods_)
+  PetscInt point = 0, next = 0;
+  for (const RodRange &rod : rods_) {
+    unknown_begin_.push_back(next);
     for (int i = 0; i < rod.vertices; ++i) {
       PetscInt *here = &unknown_[std::size_t(slot_size) * rod.slot(i)];
       PetscInt offset;
@@ -116,6 +118,10 @@ PetscErrorCode DofMap::setUp(const Scene &scene) {
       }
       ++point;
     }
+    for (PetscInt *u = &unknown_[std::size_t(slot_size) * rod.first_slot]; u < &unknown_[std::size_t(slot_size) * rod.vertexEnd()]; ++u)
+      if (*u >= 0) PetscCheck(*u == next++, PETSC_COMM_SELF, PETSC_ERR_PLIB, "unknowns must follow the slots");
+  }
+  unknown_begin_.push_back(next);
   PetscFunctionReturn(0);
 }
 
@@ -170,13 +176,11 @@ PetscErrorCode DofMap::fillMatrix(const Band &band, Mat matrix) {
   PetscFunctionReturn(0);
 }
 
-void DofMap::copyBehindRings(Planes &increment) const {
-  for (const RodRange &rod : rods_) {
-    if (!rod.closed) continue;
-    for (int a = 0; a < 3; ++a)
-      for (const int i : {0, 1}) increment[a][rod.slot(rod.vertices + i)] = increment[a][rod.slot(i)];
-    increment[3][rod.slot(rod.vertices)] = increment[3][rod.slot(0)];
-  }
+void DofMap::copyBehindRing(const RodRange &rod, Planes &increment) const {
+  if (!rod.closed) return;
+  for (int a = 0; a < 3; ++a)
+    for (const int i : {0, 1}) increment[a][rod.slot(rod.vertices + i)] = increment[a][rod.slot(i)];
+  increment[3][rod.slot(rod.vertices)] = increment[3][rod.slot(0)];
 }
 
 void DofMap::fold(const RodRange &rod, Planes &sums) const {
@@ -200,32 +204,39 @@ void DofMap::fold(const RodRange &rod, Band &band) const {
     }
 }
 
-PetscErrorCode DofMap::gather(const Planes &values, Vec out, const std::vector<char> *wanted) const {
-  PetscScalar *to;
+PetscErrorCode DofMap::gather(const Planes &values, RodSet rods, Vec out, const std::vector<char> *wanted) const {
+  PetscScalar *begin;
   PetscFunctionBeginUser;
-  PetscCall(VecGetArrayWrite(out, &to));
-  for (std::size_t r = 0; r < rods_.size(); ++r) {
-    const double scale = wanted && !(*wanted)[r] ? 0 : 1;
-    const PetscInt *u = &unknown_[std::size_t(slot_size) * rods_[r].first_slot];
-    for (int s = rods_[r].first_slot; s < rods_[r].vertexEnd(); ++s, u += slot_size)
+  PetscCall(VecGetArrayWrite(out, &begin));
+  PetscScalar *to = begin;
+  for (int r = rods.begin; r < rods.end; ++r) {
+    const RodRange &rod = rods_[r];
+    if (wanted && !(*wanted)[r]) {
+      to = std::fill_n(to, unknown_begin_[r + 1] - unknown_begin_[r], 0.0);
+      continue;
+    }
+    const PetscInt *u = &unknown_[std::size_t(slot_size) * rod.first_slot];
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s, u += slot_size) // unknowns follow each other
       for (int a = 0; a < slot_size; ++a)
-        if (u[a] >= 0) to[u[a]] = scale * values[a][s];
+        if (u[a] >= 0) *to++ = values[a][s];
   }
-  PetscCall(VecRestoreArrayWrite(out, &to));
+  PetscCall(VecRestoreArrayWrite(out, &begin));
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode DofMap::scatter(Vec in, Planes &values) const {
+PetscErrorCode DofMap::scatter(Vec in, RodSet rods, Planes &values) const {
   const PetscScalar *from;
   PetscFunctionBeginUser;
   PetscCall(VecGetArrayRead(in, &from));
-  for (const RodRange &rod : rods_) {
+  const PetscScalar *next = from;
+  for (int r = rods.begin; r < rods.end; ++r) {
+    const RodRange &rod = rods_[r];
     const PetscInt *u = &unknown_[std::size_t(slot_size) * rod.first_slot];
     for (int s = rod.first_slot; s < rod.vertexEnd(); ++s, u += slot_size)
-      for (int a = 0; a < slot_size; ++a) values[a][s] = u[a] >= 0 ? from[u[a]] : 0.0;
+      for (int a = 0; a < slot_size; ++a) values[a][s] = u[a] >= 0 ? *next++ : 0.0;
+    copyBehindRing(rod, values);
   }
   PetscCall(VecRestoreArrayRead(in, &from));
-  copyBehindRings(values);
   PetscFunctionReturn(0);
 }
 

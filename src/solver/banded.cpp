@@ -105,16 +105,17 @@ template <class T> void substitute(const T *band, const T *far, int rows, T *x) 
 
 } // namespace
 
-BandedFactor::BandedFactor(const DofMap &dofs) : dofs_(dofs), order_(dofs.rods().size()), fixed_(order_.size()), negative_(order_.size(), 0), neutral_(order_.size(), 0) {
+BandedFactor::BandedFactor(const DofMap &dofs, RodSet set)
+    : dofs_(dofs), rods_(set), order_(set.end - set.begin), fixed_(order_.size()), negative_(order_.size(), 0), neutral_(order_.size(), 0) {
   const auto &rods = dofs.rods();
   auto shape = [&](int r) { return std::pair(rods[r].vertices, rods[r].closed); };
-  std::iota(order_.begin(), order_.end(), 0);
+  std::iota(order_.begin(), order_.end(), set.begin);
   std::stable_sort(order_.begin(), order_.end(), [&](int a, int b) { return shape(a) < shape(b); });
-  for (std::size_t r = 0; r < rods.size(); ++r)
+  for (int r = set.begin; r < set.end; ++r)
     for (int i = 0; i < rods[r].vertices; ++i)
       for (int a = 0; a < slot_size; ++a)
-        if (dofs.unknown(rods[r].slot(i), a) < 0) fixed_[r].push_back(slot_size * i + a);
-  plan(std::vector<char>(rods.size(), true)); // no smaller set of rods needs more room
+        if (dofs.unknown(rods[r].slot(i), a) < 0) fixed_[r - set.begin].push_back(slot_size * i + a);
+  plan(nullptr); // no smaller set of rods needs more room
   std::size_t band = 0, far = 0, rows = 0;
   for (const Group &g : groups_) {
     const std::size_t n = std::size_t(slot_size) * rods[g.rod[0]].vertices + 2 * half_band;
@@ -128,7 +129,7 @@ BandedFactor::BandedFactor(const DofMap &dofs) : dofs_(dofs), order_(dofs.rods()
 }
 
 /// Groups of the wanted rods of each shape: whole packs; of the rest, a pack when that is cheaper than one after the other.
-void BandedFactor::plan(const std::vector<char> &wanted) {
+void BandedFactor::plan(const char *wanted) {
   constexpr int worth_a_pack = 3;
   const auto &rods = dofs_.rods();
   groups_.clear();
@@ -158,7 +159,7 @@ void BandedFactor::plan(const std::vector<char> &wanted) {
     open.count = 0;
   };
   for (const int r : order_) {
-    if (!wanted[r]) continue;
+    if (wanted && !wanted[r]) continue;
     const RodRange &rod = rods[r];
     if (open.count == lanes || (open.count > 0 && (rods[open.rod[0]].vertices != rod.vertices || rods[open.rod[0]].closed != rod.closed))) flush();
     open.rod[open.count++] = r;
@@ -167,7 +168,7 @@ void BandedFactor::plan(const std::vector<char> &wanted) {
 }
 
 void BandedFactor::factor(const BandedSystem &system) {
-  plan(system.wanted);
+  plan(system.wanted->data());
   for (const Group &group : groups_)
     if (group.packed)
       factorGroup<Pack>(group, system);
@@ -219,16 +220,16 @@ template <class T> void BandedFactor::factorGroup(const Group &group, const Band
       else
         value = v;
     };
-    if (system.shift[r] != 0)
+    if ((*system.shift)[r] != 0)
       for (int row = 0; row < rows; ++row) {
         T &d = band[std::size_t(row) * w];
-        const double shift = system.shift[r] * (*system.metric)[row % slot_size][rod.slot(row / slot_size)];
+        const double shift = (*system.shift)[r] * (*system.metric)[row % slot_size][rod.slot(row / slot_size)];
         if constexpr (std::is_same_v<T, Pack>)
           d[l] = d[l] + shift;
         else
           d += shift;
       }
-    for (const int row : fixed_[r]) {
+    for (const int row : fixed_[r - rods_.begin]) {
       set(band[std::size_t(row) * w], 1);
       for (int k = 1; k <= half_band; ++k) {
         set(band[std::size_t(row) * w + k], 0);
@@ -247,29 +248,29 @@ template <class T> void BandedFactor::factorGroup(const Group &group, const Band
   eliminate(band, far, rows, negative, neutral);
   for (int l = 0; l < group.count; ++l)
     if constexpr (std::is_same_v<T, Pack>) {
-      negative_[group.rod[l]] = int(negative[l]);
-      neutral_[group.rod[l]] = int(neutral[l]);
+      negative_[group.rod[l] - rods_.begin] = int(negative[l]);
+      neutral_[group.rod[l] - rods_.begin] = int(neutral[l]);
     } else {
-      negative_[group.rod[l]] = int(negative);
-      neutral_[group.rod[l]] = int(neutral);
+      negative_[group.rod[l] - rods_.begin] = int(negative);
+      neutral_[group.rod[l] - rods_.begin] = int(neutral);
     }
 }
 
 void BandedFactor::solve(const PetscScalar *b, PetscScalar *x) {
-  if (x != b) std::copy(b, b + dofs_.unknowns(), x);
-  std::vector<char> solved(order_.size(), false);
-  for (const Group &group : groups_) {
+  std::size_t solved = 0;
+  for (const Group &group : groups_) solved += group.count;
+  if (solved < order_.size()) {
+    if (x == b) {
+      copy_.assign(b, b + dofs_.unknowns(rods_));
+      b = copy_.data();
+    }
+    std::fill_n(x, dofs_.unknowns(rods_), 0.0);
+  }
+  for (const Group &group : groups_)
     if (group.packed)
       solveGroup<Pack>(group, b, x);
     else
       solveGroup<double>(group, b, x);
-    for (int l = 0; l < group.count; ++l) solved[group.rod[l]] = true;
-  }
-  for (std::size_t r = 0; r < solved.size(); ++r)
-    if (!solved[r])
-      for (int s = dofs_.rods()[r].first_slot; s < dofs_.rods()[r].vertexEnd(); ++s)
-        for (int a = 0; a < slot_size; ++a)
-          if (dofs_.unknown(s, a) >= 0) x[dofs_.unknown(s, a)] = 0;
 }
 
 template <class T> void BandedFactor::solveGroup(const Group &group, const PetscScalar *b, PetscScalar *x) {
@@ -283,16 +284,20 @@ template <class T> void BandedFactor::solveGroup(const Group &group, const Petsc
   std::fill(values + std::size_t(rows) * step, values + std::size_t(rows + half_band) * step, 0.0);
   auto eachUnknown = [&](auto visit) {
     for (int l = 0; l < group.count; ++l) {
-      const RodRange &rod = dofs_.rods()[group.rod[l]];
-      for (int i = 0, row = 0; i < rod.vertices; ++i)
-        for (int a = 0; a < slot_size; ++a, ++row) visit(dofs_.unknown(rod.slot(i), a), values[std::size_t(row) * step + l]);
+      const int r = group.rod[l];
+      PetscInt u = dofs_.firstUnknown({r, r + 1}) - dofs_.firstUnknown(rods_);
+      const std::vector<int> &fixed = fixed_[r - rods_.begin];
+      for (std::size_t f = 0, row = 0; row < std::size_t(rows); ++row)
+        if (f < fixed.size() && fixed[f] == int(row)) {
+          values[row * step + l] = 0;
+          ++f;
+        } else
+          visit(values[row * step + l], u++);
     }
   };
-  eachUnknown([&](PetscInt u, double &value) { value = u >= 0 ? b[u] : 0.0; });
+  eachUnknown([&](double &value, PetscInt u) { value = b[u]; });
   substitute<T>(band, far, rows, as<T>(values));
-  eachUnknown([&](PetscInt u, const double &value) {
-    if (u >= 0) x[u] = value;
-  });
+  eachUnknown([&](const double &value, PetscInt u) { x[u] = value; });
 }
 
 namespace {
@@ -325,7 +330,7 @@ PetscErrorCode solveVec(Mat f, Vec b, Vec x) {
 PetscErrorCode inertia(Mat f, PetscInt *negative, PetscInt *zero, PetscInt *positive) {
   PetscInt minus = 0, none = 0;
   PetscFunctionBegin;
-  for (int r = 0; r < factorOf(f)->rods(); ++r) {
+  for (int r = factorOf(f)->rods().begin; r < factorOf(f)->rods().end; ++r) {
     minus += factorOf(f)->negativePivots(r);
     none += factorOf(f)->neutralPivots(r);
   }
@@ -374,7 +379,7 @@ PetscErrorCode create(Mat a, MatFactorType, Mat *out) {
   PetscCall(MatSetSizes(f, a->rmap->n, a->cmap->n, a->rmap->N, a->cmap->N));
   PetscCall(PetscStrallocpy(name, &((PetscObject)f)->type_name));
   PetscCall(MatSetUp(f));
-  f->data = new BandedFactor(*system->dofs);
+  f->data = new BandedFactor(*system->dofs, system->rods);
   f->ops->choleskyfactorsymbolic = symbolic;
   f->ops->getinfo = getInfo;
   f->ops->destroy = destroy;
@@ -395,15 +400,15 @@ PetscErrorCode multiply(Mat a, Vec x, Vec y) {
   PetscCall(MatShellGetContext(a, &system));
   const DofMap &dofs = *system->dofs;
   Planes in = dofs.makePlanes(), out = dofs.makePlanes();
-  PetscCall(dofs.scatter(x, in));
-  for (std::size_t r = 0; r < dofs.rods().size(); ++r) {
+  PetscCall(dofs.scatter(x, system->rods, in));
+  for (int r = system->rods.begin; r < system->rods.end; ++r) {
     const RodRange &rod = dofs.rods()[r];
     system->band->multiply(rod, in, out);
     dofs.fold(rod, out);
     for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
-      for (int k = 0; k < slot_size; ++k) out[k][s] += system->shift[r] * (*system->metric)[k][s] * in[k][s];
+      for (int k = 0; k < slot_size; ++k) out[k][s] += (*system->shift)[r] * (*system->metric)[k][s] * in[k][s];
   }
-  PetscCall(dofs.gather(out, y));
+  PetscCall(dofs.gather(out, system->rods, y));
   PetscFunctionReturn(0);
 }
 
@@ -411,7 +416,7 @@ PetscErrorCode multiply(Mat a, Vec x, Vec y) {
 
 PetscErrorCode createBandedMatrix(BandedSystem *system, Mat *matrix) {
   PetscFunctionBeginUser;
-  const PetscInt n = system->dofs->unknowns();
+  const PetscInt n = system->dofs->unknowns(system->rods);
   PetscCall(MatCreateShell(PETSC_COMM_WORLD, n, n, PETSC_DETERMINE, PETSC_DETERMINE, system, matrix));
   PetscCall(MatShellSetOperation(*matrix, MATOP_MULT, (void (*)(void))multiply));
   PetscCall(MatSetOption(*matrix, MAT_SYMMETRIC, PETSC_TRUE));

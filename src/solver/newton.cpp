@@ -60,6 +60,11 @@ double dot(const RodRange &rod, const Planes &a, const Planes &b) {
 
 } // namespace
 
+NewtonWork::NewtonWork(const IncrementalPotential &potential)
+    : wanted(potential.all().end, true), shift(wanted.size(), 0), last_shift(shift), negative(wanted.size(), 0), energy(wanted.size()), energy_known(wanted.size(), false),
+      residual(wanted.size()), moving(wanted.size(), false), increment(potential.dofs().makePlanes()), coordinates(increment), motion(increment),
+      metric(shiftMetric(potential.elements(), potential.dofs())), trial(potential.elements().slots) {}
+
 bool isSmall(const IncrementalPotential::Residual &r, double rtol) {
   return r.force <= std::max(rtol, r.force_floor) && r.moment <= std::max(rtol, r.moment_floor) &&
          r.compatibility <= std::max(1e-4 * rtol, r.compatibility_floor);
@@ -72,27 +77,24 @@ PetscErrorCode registerSolvers() {
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential) {
+PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &work, RodSet set) {
   KSP ksp;
   PC pc;
   SNESLineSearch search;
   PetscFunctionBeginUser;
   potential_ = &potential;
+  rods_ = set;
   DofMap &dofs = potential.dofs();
-  const std::size_t rods = dofs.rods().size();
-  metric_ = shiftMetric(potential.elements(), dofs);
-  increment_ = dofs.makePlanes();
-  energy_.resize(rods);
-  energy_known_.assign(rods, false);
-  negative_.assign(rods, 0);
-  last_shift_.assign(rods, 0);
-  residual_.resize(rods);
-  moving_.assign(rods, false);
-  system_ = {&dofs, &potential.band(), &metric_, std::vector<char>(rods, true), std::vector<double>(rods, 0)};
-  PetscCall(DMCreateGlobalVector(dofs.dm(), x_.out()));
+  work_ = &work;
+  system_ = {&dofs, set, &potential.band(), &work.metric, &work.wanted, &work.shift};
+  const bool whole = set.begin == 0 && set.end == dofs.all().end;
+  if (whole)
+    PetscCall(DMCreateGlobalVector(dofs.dm(), x_.out()));
+  else
+    PetscCall(VecCreateSeq(PETSC_COMM_SELF, dofs.unknowns(set), x_.out()));
   for (OwnedVec *v : {&f_, &right_, &solution_}) PetscCall(VecDuplicate(x_, v->out()));
-  PetscCall(SNESCreate(PETSC_COMM_WORLD, snes_.out()));
-  PetscCall(SNESSetDM(snes_, dofs.dm()));
+  PetscCall(SNESCreate(whole ? PETSC_COMM_WORLD : PETSC_COMM_SELF, snes_.out()));
+  if (whole) PetscCall(SNESSetDM(snes_, dofs.dm()));
   PetscCall(SNESSetApplicationContext(snes_, this));
   PetscCall(SNESSetType(snes_, SNESNEWTONLS));
   PetscCall(SNESSetFunction(snes_, f_, functionCallback, this));
@@ -134,8 +136,8 @@ PetscErrorCode NewtonSolver::moveTo(Vec x) {
   PetscCall(PetscObjectStateGet((PetscObject)x, &state));
   if (x == iterate_vec_ && state == iterate_state_) PetscFunctionReturn(0);
   Planes wanted = potential_->dofs().makePlanes();
-  PetscCall(potential_->dofs().scatter(x, wanted));
-  potential_->moveTo(wanted);
+  PetscCall(potential_->dofs().scatter(x, rods_, wanted));
+  potential_->moveTo(wanted, rods_);
   forgetEnergies();
   iterate_vec_ = x;
   iterate_state_ = state;
@@ -144,8 +146,8 @@ PetscErrorCode NewtonSolver::moveTo(Vec x) {
 
 PetscErrorCode NewtonSolver::writeIterate(Vec x) {
   PetscFunctionBeginUser;
-  potential_->coordinates(coordinates_);
-  PetscCall(potential_->dofs().gather(coordinates_, x));
+  potential_->coordinates(work_->coordinates, rods_);
+  PetscCall(potential_->dofs().gather(work_->coordinates, rods_, x));
   iterate_vec_ = x;
   PetscCall(PetscObjectStateGet((PetscObject)x, &iterate_state_));
   PetscFunctionReturn(0);
@@ -155,16 +157,23 @@ PetscErrorCode NewtonSolver::evaluate(Vec x, Vec f) {
   PetscFunctionBeginUser;
   PetscCall(moveTo(x));
   PetscCall(PetscLogEventBegin(events().derivatives, 0, 0, 0, 0));
-  const Derivatives &d = potential_->derivatives();
+  // Newton squares a small residual: from below the root of the tolerance the next iterate is taken for an answer, which needs no Hessian.
+  const Derivatives *d = nullptr;
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    if (!work_->wanted[r]) continue;
+    const IncrementalPotential::Residual &last = work_->residual[r];
+    d = std::max(last.force, last.moment) < likely_ ? &potential_->gradient(r) : &potential_->derivatives({r, r + 1});
+  }
   PetscCall(PetscLogEventEnd(events().derivatives, 0, 0, 0, 0));
-  PetscCall(potential_->dofs().gather(d.gradient, f, &system_.wanted));
+  if (d) PetscCall(potential_->dofs().gather(d->gradient, rods_, f, &work_->wanted));
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode NewtonSolver::assemble(Mat) {
   PetscFunctionBeginUser;
-  potential_->derivatives();
-  std::fill(system_.shift.begin(), system_.shift.end(), 0.0);
+  for (int r = rods_.begin; r < rods_.end; ++r)
+    if (work_->wanted[r]) potential_->derivatives({r, r + 1});
+  fill(work_->shift, 0.0);
   PetscCall(refill());
   PetscFunctionReturn(0);
 }
@@ -177,14 +186,14 @@ PetscErrorCode NewtonSolver::refill() {
     PetscCall(PetscObjectStateIncrease((PetscObject)jacobian_.object()));
   else {
     PetscCall(potential_->dofs().fillMatrix(potential_->band(), jacobian_));
-    if (std::any_of(system_.shift.begin(), system_.shift.end(), [](double shift) { return shift != 0; })) {
-      Planes diagonal = metric_;
-      for (std::size_t r = 0; r < system_.shift.size(); ++r) {
+    if (std::any_of(work_->shift.begin() + rods_.begin, work_->shift.begin() + rods_.end, [](double shift) { return shift != 0; })) {
+      Planes diagonal = work_->metric;
+      for (int r = rods_.begin; r < rods_.end; ++r) {
         const RodRange &rod = potential_->elements().rods[r];
         for (int a = 0; a < slot_size; ++a)
-          for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) diagonal[a][s] *= system_.shift[r];
+          for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) diagonal[a][s] *= work_->shift[r];
       }
-      PetscCall(potential_->dofs().gather(diagonal, right_));
+      PetscCall(potential_->dofs().gather(diagonal, rods_, right_));
       PetscCall(MatDiagonalSet(jacobian_, right_, ADD_VALUES));
     }
   }
@@ -207,9 +216,9 @@ PetscErrorCode NewtonSolver::solveLinear(const Planes &right, Planes &solution) 
   KSP ksp;
   PetscFunctionBeginUser;
   PetscCall(SNESGetKSP(snes_, &ksp));
-  PetscCall(potential_->dofs().gather(right, right_));
+  PetscCall(potential_->dofs().gather(right, rods_, right_));
   PetscCall(KSPSolve(ksp, right_, solution_));
-  PetscCall(potential_->dofs().scatter(solution_, solution));
+  PetscCall(potential_->dofs().scatter(solution_, rods_, solution));
   PetscFunctionReturn(0);
 }
 
@@ -218,20 +227,21 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
   PetscInt limit;
   PetscFunctionBeginUser;
   PetscCall(SNESGetTolerances(snes_, nullptr, &rtol, nullptr, &limit, nullptr));
+  likely_ = std::sqrt(rtol);
   rtol *= sharpness_;
   report_.iterations = int(iteration);
-  const bool moving = potential_->remainingMotion(motion_);
+  const bool moving = potential_->remainingMotion(rods_, work_->motion);
   bool done = true, finite = true;
   IncrementalPotential::Residual &worst = report_.residual = {};
-  for (int r = 0; r < potential_->rods(); ++r) {
+  for (int r = rods_.begin; r < rods_.end; ++r) {
     const RodRange &rod = potential_->elements().rods[r];
-    IncrementalPotential::Residual &residual = residual_[r];
-    if (system_.wanted[r]) { // a rod that has converged takes no part any more
+    IncrementalPotential::Residual &residual = work_->residual[r];
+    if (work_->wanted[r]) { // a rod that has converged takes no part any more
       residual = potential_->residual(r);
-      moving_[r] = moving && dot(rod, motion_, motion_) > 0;
+      work_->moving[r] = moving && dot(rod, work_->motion, work_->motion) > 0;
       finite = finite && residual.isFinite();
-      system_.wanted[r] = moving_[r] || !isSmall(residual, rtol);
-      done = done && !system_.wanted[r];
+      work_->wanted[r] = work_->moving[r] || !isSmall(residual, rtol);
+      done = done && !work_->wanted[r];
     }
     worst.include(residual);
   }
@@ -260,20 +270,20 @@ PetscErrorCode NewtonSolver::readInertia(bool *regular) {
   PetscCall(PCGetFailedReason(pc, &failed));
   *regular = failed == PC_NOERROR;
   PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &cholesky));
-  std::fill(negative_.begin(), negative_.end(), 0);
+  fill(work_->negative, 0);
   report_.neutral_pivots = report_.negative_pivots = 0;
   if (!cholesky || !*regular) PetscFunctionReturn(0);
   PetscCall(PCFactorGetMatrix(pc, &factor));
   if (const BandedFactor *banded = banded_ ? bandedFactorOf(factor) : nullptr) {
-    for (int r = 0; r < potential_->rods(); ++r) {
-      if (system_.wanted[r]) negative_[r] = banded->negativePivots(r);
+    for (int r = rods_.begin; r < rods_.end; ++r) {
+      if (work_->wanted[r]) work_->negative[r] = banded->negativePivots(r);
       report_.negative_pivots += banded->negativePivots(r);
       report_.neutral_pivots += banded->neutralPivots(r);
     }
   } else {
     PetscInt minus, zero, plus;
     PetscCall(MatGetInertia(factor, &minus, &zero, &plus));
-    std::fill(negative_.begin(), negative_.end(), int(minus));
+    fill(work_->negative, int(minus));
     report_.negative_pivots = int(minus);
     report_.neutral_pivots = int(zero);
   }
@@ -285,23 +295,24 @@ PetscErrorCode NewtonSolver::includeMotion(Vec y) {
   KSP ksp;
   PetscFunctionBeginUser;
   const DofMap &dofs = potential_->dofs();
-  Planes right = dofs.makePlanes();
-  for (const RodRange &rod : dofs.rods()) {
-    potential_->band().multiply(rod, motion_, right);
+  Planes &right = work_->coordinates; // free until the iterate is written
+  const Planes &gradient = potential_->derivatives(rods_).gradient;
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    const RodRange &rod = dofs.rods()[r];
+    for (int a = 0; a < slot_size; ++a) std::copy(gradient[a] + rod.first_slot, gradient[a] + rod.vertexEnd() + 2, right[a] + rod.first_slot);
+    potential_->band().multiply(rod, work_->motion, right);
     dofs.fold(rod, right);
   }
-  const Planes &gradient = potential_->derivatives().gradient;
-  for (std::size_t k = 0; k < right.size(); ++k) right.data()[k] += gradient.data()[k];
-  PetscCall(dofs.gather(right, right_, &system_.wanted));
+  PetscCall(dofs.gather(right, rods_, right_, &work_->wanted));
   PetscCall(SNESGetKSP(snes_, &ksp));
   PetscCall(KSPSolve(ksp, right_, y));
   PetscFunctionReturn(0);
 }
 
 const IncrementalPotential::RodEnergy &NewtonSolver::energyAtIterate(int r) {
-  if (!energy_known_[r]) energy_[r] = potential_->rodEnergy(potential_->iterate(), r);
-  energy_known_[r] = true;
-  return energy_[r];
+  if (!work_->energy_known[r]) work_->energy[r] = potential_->rodEnergy(potential_->iterate(), r);
+  work_->energy_known[r] = true;
+  return work_->energy[r];
 }
 
 /// Moves one rod along its increment; false when no length of the step lowers its energy enough.
@@ -309,22 +320,22 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
   constexpr double sufficient = 1e-4;
   constexpr int most_trials = 40;
   const RodRange &rod = potential_->elements().rods[r];
-  double slope = -dot(rod, potential_->derivatives().gradient, increment_);
+  double slope = -dot(rod, potential_->gradient(r).gradient, work_->increment);
   if (!std::isfinite(slope)) return false;
   for (int a = 0; a < slot_size; ++a)
     for (int s = rod.first_slot; s < rod.vertexEnd() + (rod.closed ? 2 : 0); s += lanes) {
-      const Pack d = read<Pack>(increment_[a] + s);
-      write(increment_[a] + s, moving_[r] ? Pack(read<Pack>(motion_[a] + s) - d) : Pack(-d));
+      const Pack d = read<Pack>(work_->increment[a] + s);
+      write(work_->increment[a] + s, work_->moving[r] ? Pack(read<Pack>(work_->motion[a] + s) - d) : Pack(-d));
     }
   const IncrementalPotential::RodEnergy before = energyAtIterate(r);
   IncrementalPotential::RodEnergy after;
   auto attempt = [&](double length) {
     ++report_.trials;
     (void)PetscLogEventBegin(events().configuration, 0, 0, 0, 0);
-    const bool possible = potential_->tryMove(increment_, length, r, trial_);
+    const bool possible = potential_->tryMove(work_->increment, length, r, work_->trial);
     (void)PetscLogEventEnd(events().configuration, 0, 0, 0, 0);
     (void)PetscLogEventBegin(events().energy, 0, 0, 0, 0);
-    const IncrementalPotential::RodEnergy energy = possible ? potential_->rodEnergy(trial_, r) : IncrementalPotential::RodEnergy{};
+    const IncrementalPotential::RodEnergy energy = possible ? potential_->rodEnergy(work_->trial, r) : IncrementalPotential::RodEnergy{};
     (void)PetscLogEventEnd(events().energy, 0, 0, 0, 0);
     return energy;
   };
@@ -333,7 +344,7 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
   for (int trial = 0; trial < most_trials && !accepted; ++trial) {
     after = attempt(*lambda);
     // Supports that move do work: the energy may rise with them, and only has to be finite.
-    accepted = std::isfinite(after.value) && (moving_[r] || seek_ == Seek::equilibrium || after.value <= before.value + sufficient * *lambda * slope + before.noise);
+    accepted = std::isfinite(after.value) && (work_->moving[r] || seek_ == Seek::equilibrium || after.value <= before.value + sufficient * *lambda * slope + before.noise);
     if (accepted) break;
     // Minimum of the parabola through both energies and the slope, kept within a fifth and a half.
     const double curvature = after.value - before.value - *lambda * slope;
@@ -350,11 +361,11 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
       after = beyond;
       *lambda = longer;
     } else
-      potential_->tryMove(increment_, 1, r, trial_);
+      potential_->tryMove(work_->increment, 1, r, work_->trial);
   }
-  potential_->accept(trial_, r);
-  energy_[r] = after;
-  energy_known_[r] = potential_->scene().moments.empty(); // the work of couples is counted from the iterate
+  potential_->accept(work_->trial, r);
+  work_->energy[r] = after;
+  work_->energy_known[r] = potential_->scene().moments.empty(); // the work of couples is counted from the iterate
   return true;
 }
 
@@ -367,14 +378,14 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   PetscCall(moveTo(x));
   PetscCall(readInertia(&regular));
   if (seek_ == Seek::minimum && (report_.negative_pivots > 0 || !regular)) PetscCall(makeDescent(f, y, regular));
-  if (std::any_of(moving_.begin(), moving_.end(), [](char m) { return m; })) PetscCall(includeMotion(y));
-  PetscCall(potential_->dofs().scatter(y, increment_));
+  if (std::any_of(work_->moving.begin() + rods_.begin, work_->moving.begin() + rods_.end, [](char m) { return m; })) PetscCall(includeMotion(y));
+  PetscCall(potential_->dofs().scatter(y, rods_, work_->increment));
 
   PetscCall(PetscLogEventBegin(events().line_search, 0, 0, 0, 0));
   double shortest = 1;
   bool accepted = true;
-  for (int r = 0; r < potential_->rods() && accepted; ++r) {
-    if (!system_.wanted[r]) continue;
+  for (int r = rods_.begin; r < rods_.end && accepted; ++r) {
+    if (!work_->wanted[r]) continue;
     double lambda;
     accepted = searchRod(r, &lambda);
     shortest = std::min(shortest, lambda);
@@ -388,18 +399,16 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   }
   PetscCall(writeIterate(x));
   PetscCall(SNESComputeFunction(snes_, x, f));
-  PetscReal xnorm, fnorm, ynorm;
-  PetscCall(VecNorm(x, NORM_2, &xnorm));
-  PetscCall(VecNorm(f, NORM_2, &fnorm));
-  PetscCall(VecNorm(y, NORM_2, &ynorm));
-  PetscCall(SNESLineSearchSetNorms(search, xnorm, fnorm, ynorm));
+  PetscReal norm; // only monitors look at it; those of x and y serve tests that are not used here
+  PetscCall(VecNorm(f, NORM_2, &norm));
+  PetscCall(SNESLineSearchSetNorms(search, 0, norm, 0));
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode NewtonSolver::inertiaAtIterate(int *negative) {
   bool regular;
   PetscFunctionBeginUser;
-  std::fill(system_.wanted.begin(), system_.wanted.end(), true);
+  fill(work_->wanted, true);
   PetscCall(assemble(jacobian_));
   PetscCall(refactor());
   PetscCall(readInertia(&regular));
@@ -411,7 +420,7 @@ PetscErrorCode NewtonSolver::inertiaAtIterate(int *negative) {
 PetscErrorCode NewtonSolver::newton(const char **failure) {
   SNESConvergedReason reason;
   PetscFunctionBeginUser;
-  std::fill(system_.wanted.begin(), system_.wanted.end(), true);
+  fill(work_->wanted, true);
   PetscCall(writeIterate(x_));
   const int before = report_.iterations;
   PetscCall(SNESSolve(snes_, nullptr, x_));
@@ -444,7 +453,7 @@ std::string NewtonSolver::nearBarrier() const {
   const Elements &e = potential_->elements();
   const Configuration &c = potential_->iterate();
   double twist = 0, turning = 0;
-  for (int r = 0; r < potential_->rods(); ++r)
+  for (int r = rods_.begin; r < rods_.end; ++r)
     forCells(e, r, [&]<class T>(const LooseCell &cell, int count) {
       for (int l = 0; l < count; ++l) {
         if (e.measure[r] == Measure::tan) twist = std::max(twist, std::abs(c[Configuration::twist][cell.slot + l]));
@@ -459,56 +468,47 @@ std::string NewtonSolver::nearBarrier() const {
   return hint;
 }
 
-/// Factors once before the first step, so that mistakes in solver options come to light in time.
-PetscErrorCode NewtonSolver::rehearse(const State &start, const Step &step) {
-  int negative;
-  PetscFunctionBeginUser;
-  potential_->beginStep(start, step);
-  PetscCall(inertiaAtIterate(&negative));
-  report_ = {};
-  PetscFunctionReturn(0);
-}
-
 /// Starts every rod from where its velocities lead when that is lower than the start.
-void NewtonSolver::predict(const State &start, const Step &step) {
+void NewtonSolver::predict(const State &start) {
   const DofMap &dofs = potential_->dofs();
-  const double *freedom = potential_->elements().freedom();
-  for (const RodRange &rod : dofs.rods()) {
-    for (int i = 0; i < rod.vertices; ++i)
-      for (int a = 0; a < 3; ++a) increment_[a][rod.slot(i)] = freedom[rod.slot(i)] * step.dt * start.velocity[rod.first_vertex + i][a];
-    for (int i = 0; i < rod.edges; ++i) increment_[3][rod.slot(i)] = rod.twist ? step.dt * start.twist_rate[rod.first_edge + i] : 0;
-  }
-  dofs.copyBehindRings(increment_);
+  const double *freedom = potential_->elements().freedom(), dt = potential_->step().dt;
   const RetractionKind kind = potential_->retraction == RetractionKind::length ? RetractionKind::continued : potential_->retraction;
-  for (int r = 0; r < potential_->rods(); ++r) {
-    if (!potential_->tryMove(increment_, 1, r, kind, trial_)) continue;
-    const IncrementalPotential::RodEnergy energy = potential_->rodEnergy(trial_, r);
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    const RodRange &rod = dofs.rods()[r];
+    for (int i = 0; i < rod.vertices; ++i)
+      for (int a = 0; a < 3; ++a) work_->increment[a][rod.slot(i)] = freedom[rod.slot(i)] * dt * start.velocity[rod.first_vertex + i][a];
+    for (int i = 0; i < rod.edges; ++i) work_->increment[3][rod.slot(i)] = rod.twist ? dt * start.twist_rate[rod.first_edge + i] : 0;
+    dofs.copyBehindRing(rod, work_->increment);
+    if (!potential_->tryMove(work_->increment, 1, r, kind, work_->trial)) continue;
+    const IncrementalPotential::RodEnergy energy = potential_->rodEnergy(work_->trial, r);
     if (!(energy.value < energyAtIterate(r).value)) continue;
-    potential_->accept(trial_, r);
-    energy_[r] = energy;
-    energy_known_[r] = potential_->scene().moments.empty();
+    potential_->accept(work_->trial, r);
+    work_->energy[r] = energy;
+    work_->energy_known[r] = potential_->scene().moments.empty();
   }
 }
 
-PetscErrorCode NewtonSolver::solve(const State &start, const Step &step, NewtonReport *report, Seek seek, const Planes *guess) {
+PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, Seek seek, const Planes *guess) {
   const char *failure = nullptr;
+  const bool is_static = potential_->step().isStatic();
   PetscFunctionBeginUser;
   report_ = {};
   seek_ = seek;
   sharpness_ = 1;
-  std::fill(last_shift_.begin(), last_shift_.end(), 0.0); // a step depends on its start alone
-  potential_->beginStep(start, step);
+  likely_ = 0;
+  fill(work_->last_shift, 0.0); // a step depends on its start alone
+  for (int r = rods_.begin; r < rods_.end; ++r) potential_->beginRod(start, r);
   forgetEnergies();
   if (guess)
-    potential_->moveTo(*guess);
-  else if (!step.isStatic())
-    predict(start, step);
+    potential_->moveTo(*guess, rods_);
+  else if (!is_static)
+    predict(start);
   if (potential_->beyondBarrier())
     failure = "a support turns past the barrier of measure tan at 180 degrees of twist per vertex; use more edges, or measure: angle";
   else
     PetscCall(newton(&failure));
   // In statics the answer must be a minimum.
-  for (int k = 0; step.isStatic() && !failure; ++k) {
+  for (int k = 0; is_static && !failure; ++k) {
     int negative;
     PetscCall(inertiaAtIterate(&negative));
     report_.negative_pivots = negative;

@@ -21,8 +21,8 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
   const int unshifted = report_.negative_pivots;
   const HessianKind kind = potential_->step().hessian == HessianKind::exact ? HessianKind::uncompressed : potential_->step().hessian;
   bool compressed = false;
-  for (int r = 0; r < potential_->rods(); ++r) {
-    if (!system_.wanted[r] || negative_[r] <= (banded_ ? few : few * potential_->rods())) continue;
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    if (!work_->wanted[r] || work_->negative[r] <= (banded_ ? few : few * (rods_.end - rods_.begin))) continue;
     potential_->assembleRod(r, kind);
     compressed = true;
   }
@@ -56,11 +56,11 @@ PetscErrorCode NewtonSolver::shiftUntilPositive(bool regular) {
   PetscFunctionBeginUser;
   for (int attempt = 0; attempt < 40; ++attempt) {
     bool any = false;
-    for (int r = 0; r < potential_->rods(); ++r) {
-      if (!system_.wanted[r] || (negative_[r] == 0 && regular)) continue;
-      double &shift = system_.shift[r];
-      shift = shift > 0 ? 8 * shift : last_shift_[r] > 0 ? 0.25 * last_shift_[r] : firstShift(r);
-      last_shift_[r] = shift;
+    for (int r = rods_.begin; r < rods_.end; ++r) {
+      if (!work_->wanted[r] || (work_->negative[r] == 0 && regular)) continue;
+      double &shift = work_->shift[r];
+      shift = shift > 0 ? 8 * shift : work_->last_shift[r] > 0 ? 0.25 * work_->last_shift[r] : firstShift(r);
+      work_->last_shift[r] = shift;
       any = true;
     }
     if (!any) break;
@@ -71,66 +71,68 @@ PetscErrorCode NewtonSolver::shiftUntilPositive(bool regular) {
   PetscFunctionReturn(0);
 }
 
-/// A direction of negative curvature at an unstable equilibrium, in increment_. With the Hessian K = E - G split into the part E without
+/// A direction of negative curvature at an unstable equilibrium, in work_->increment. With the Hessian K = E - G split into the part E without
 /// compression and the effect G of compression, iterating v <- E^-1 G v gives the first buckling mode, the smoothest way out. Where compression
 /// is not the cause, inverse iteration with the shifted Hessian finds the lowest mode.
 PetscErrorCode NewtonSolver::findBucklingMode(bool *found) {
   PetscFunctionBeginUser;
   const DofMap &dofs = potential_->dofs();
   const Elements &e = potential_->elements();
-  Band softening = potential_->derivatives().band;
+  Band softening = potential_->derivatives(rods_).band;
   auto dot = [](const Planes &a, const Planes &b) {
     double sum = 0;
     for (std::size_t k = 0; k < a.size(); ++k) sum += a.data()[k] * b.data()[k];
     return sum;
   };
   // A fixed start without symmetry: the same on every machine, orthogonal to no mode of interest.
-  increment_.clear();
-  for (const RodRange &rod : e.rods)
+  work_->increment.clear();
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    const RodRange &rod = e.rods[r];
     for (int i = 0; i < rod.vertices; ++i)
       for (int a = 0; a < slot_size; ++a)
-        if (dofs.unknown(rod.slot(i), a) >= 0) increment_[a][rod.slot(i)] = 1 + 0.5 * std::sin(1.7 * (slot_size * i + a));
-  dofs.copyBehindRings(increment_);
+        if (dofs.unknown(rod.slot(i), a) >= 0) work_->increment[a][rod.slot(i)] = 1 + 0.5 * std::sin(1.7 * (slot_size * i + a));
+    dofs.copyBehindRing(rod, work_->increment);
+  }
   bool regular;
-  for (int r = 0; r < potential_->rods(); ++r) potential_->assembleRod(r, HessianKind::uncompressed);
+  for (int r = rods_.begin; r < rods_.end; ++r) potential_->assembleRod(r, HessianKind::uncompressed);
   PetscCall(refactor());
   PetscCall(readInertia(&regular));
   const bool buckles = regular && report_.negative_pivots == 0;
   if (buckles)
     softening.subtractFrom(potential_->band());
   else {
-    for (int r = 0; r < potential_->rods(); ++r) potential_->assembleRod(r, HessianKind::exact);
+    for (int r = rods_.begin; r < rods_.end; ++r) potential_->assembleRod(r, HessianKind::exact);
     PetscCall(shiftUntilPositive(false));
   }
   // With A v = b solved, v'K v = v'b - v'(A - K)v: the stiff part of A never enters, whose rounding would hide a small curvature.
   auto soften = [&] { // (A - K) v
     Planes y = dofs.makePlanes();
-    for (std::size_t r = 0; r < e.rods.size(); ++r) {
+    for (int r = rods_.begin; r < rods_.end; ++r) {
       const RodRange &rod = e.rods[r];
       if (buckles) {
-        softening.multiply(rod, increment_, y);
+        softening.multiply(rod, work_->increment, y);
         dofs.fold(rod, y);
       } else
         for (int a = 0; a < slot_size; ++a)
-          for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) y[a][s] = system_.shift[r] * metric_[a][s] * increment_[a][s];
+          for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) y[a][s] = work_->shift[r] * work_->metric[a][s] * work_->increment[a][s];
     }
     return y;
   };
   auto normalise = [&] {
     double norm = 0;
-    for (std::size_t k = 0; k < metric_.size(); ++k) norm += metric_.data()[k] * increment_.data()[k] * increment_.data()[k];
-    for (double &d : increment_) d /= std::sqrt(norm);
+    for (std::size_t k = 0; k < work_->metric.size(); ++k) norm += work_->metric.data()[k] * work_->increment.data()[k] * work_->increment.data()[k];
+    for (double &d : work_->increment) d /= std::sqrt(norm);
   };
   *found = false;
   normalise();
   Planes right = soften();
   for (int k = 0; k < 100 && !*found; ++k) {
-    PetscCall(solveLinear(right, increment_));
-    *found = k >= 5 && dot(increment_, right) < dot(increment_, soften());
+    PetscCall(solveLinear(right, work_->increment));
+    *found = k >= 5 && dot(work_->increment, right) < dot(work_->increment, soften());
     normalise();
     right = soften();
   }
-  for (int r = 0; r < potential_->rods(); ++r) potential_->assembleRod(r, potential_->step().hessian);
+  for (int r = rods_.begin; r < rods_.end; ++r) potential_->assembleRod(r, potential_->step().hessian);
   PetscFunctionReturn(0);
 }
 
@@ -145,23 +147,23 @@ PetscErrorCode NewtonSolver::escapeSaddle(bool *left) {
   // One unit: the edge that turns most turns by one radian.
   double turning = 0;
   const Elements &e = potential_->elements();
-  for (const RodRange &rod : e.rods)
-    for (int s = rod.first_slot; s < rod.edgeEnd(); ++s) {
-      for (int a = 0; a < 3; ++a) turning = std::max(turning, std::abs(increment_[a][s + 1] - increment_[a][s]) * e.inverseRestLength()[s]);
-      turning = std::max(turning, std::abs(increment_[3][s]));
+  for (int r = rods_.begin; r < rods_.end; ++r)
+    for (int s = e.rods[r].first_slot; s < e.rods[r].edgeEnd(); ++s) {
+      for (int a = 0; a < 3; ++a) turning = std::max(turning, std::abs(work_->increment[a][s + 1] - work_->increment[a][s]) * e.inverseRestLength()[s]);
+      turning = std::max(turning, std::abs(work_->increment[3][s]));
     }
-  for (double &d : increment_) d /= turning;
+  for (double &d : work_->increment) d /= turning;
   auto move = [&](RetractionKind kind, double scale) {
-    for (int r = 0; r < potential_->rods(); ++r)
-      if (!potential_->tryMove(increment_, scale, r, kind, trial_)) return false;
+    for (int r = rods_.begin; r < rods_.end; ++r)
+      if (!potential_->tryMove(work_->increment, scale, r, kind, work_->trial)) return false;
     return true;
   };
   RetractionKind best_kind = RetractionKind::length;
-  double best = potential_->energy(potential_->iterate()), best_scale = 0;
+  double best = potential_->energy(potential_->iterate(), rods_), best_scale = 0;
   for (const RetractionKind kind : {RetractionKind::length, RetractionKind::additive})
     for (double scale = 1e-6; scale < 2; scale *= 2) // just past a branching of a stiff rod the other branch is that close
       for (const double s : {scale, -scale}) {
-        const double energy = move(kind, s) ? potential_->energy(trial_) : HUGE_VAL;
+        const double energy = move(kind, s) ? potential_->energy(work_->trial, rods_) : HUGE_VAL;
         if (energy >= best) continue;
         best = energy;
         best_scale = s;
@@ -169,8 +171,10 @@ PetscErrorCode NewtonSolver::escapeSaddle(bool *left) {
       }
   *left = best_scale != 0 && move(best_kind, best_scale);
   if (!*left) PetscFunctionReturn(0);
-  potential_->accept(trial_);
-  potential_->resetAxialForces();
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    potential_->accept(work_->trial, r);
+    potential_->resetAxialForces(r);
+  }
   forgetEnergies();
   ++report_.escapes;
   PetscFunctionReturn(0);

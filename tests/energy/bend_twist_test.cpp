@@ -37,6 +37,8 @@ template <Measure measure> void expectDerivativesMatch(const RandomCell &c, doub
   // 1e-10 relative: the conditioning of the fold (1 + cos 170 deg = 0.015, to the third power) times rounding stays well below it.
   EXPECT_LT(gradient_error, tolerance * reference.g.cwiseAbs().maxCoeff());
   EXPECT_LT(hessian_error, tolerance * reference.h.cwiseAbs().maxCoeff());
+  const std::array<double, cell_size> alone = cellGradient<measure>(c.f0, c.f1, c.cell);
+  for (int r = 0; r < cell_size; ++r) EXPECT_NEAR(alone[r], d.gradient[r], tolerance * reference.g.cwiseAbs().maxCoeff());
   EXPECT_NEAR(cellEnergy<measure>(c.f0, c.f1, c.cell), reference.v, std::max(1e-13, 0.5 * (tolerance - 1e-10)) * std::abs(reference.v));
 }
 

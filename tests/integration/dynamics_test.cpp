@@ -120,7 +120,7 @@ TEST(FoldBarrier, IsNotSteppedOver) {
     Rod rod = inextensibleRod({Vec3(0, 0, 0), Vec3(1, 0, 0), corner(170)}, measure);
     Simulation sim;
     EXPECT_PETSC(sim.setUp(clampedScene(rod), dynamics(0.01, 1)));
-    sim.potential->beginStep(sim.state, TimeLoop::stepOf(dynamics(0.01, 1), sim.state, 0.01));
+    sim.solver.begin(sim.state, TimeLoop::stepOf(dynamics(0.01, 1), sim.state, 0.01));
     Planes increment = sim.dofs.makePlanes();
     Configuration trial;
     auto possible = [&](double degrees) {
@@ -214,8 +214,8 @@ TEST(StiffnessDamping, DoesNotSeeRigidMotion) {
   Step step;
   step.dt = 0.01;
   step.time = 0.01;
-  damped.potential->beginStep(damped.state, step);
-  plain.potential->beginStep(plain.state, step);
+  damped.solver.begin(damped.state, step);
+  plain.solver.begin(plain.state, step);
   const double a = damped.potential->energy(configurationOf(turned, damped.scene, *damped.elements, 0));
   const double b = plain.potential->energy(configurationOf(turned, plain.scene, *plain.elements, 0));
   EXPECT_NEAR(a, b, 1e-12 * std::abs(b));
@@ -242,8 +242,8 @@ TEST(StiffnessDamping, IsTheRatePotentialOfTheStoredEnergy) {
   Step step;
   step.dt = step.time = 0.01;
   auto added = [&](const Configuration &c) { return damped.potential->energy(c) - plain.potential->energy(c); };
-  plain.potential->beginStep(plain.state, step);
-  damped.potential->beginStep(damped.state, step);
+  plain.solver.begin(plain.state, step);
+  damped.solver.begin(damped.state, step);
   const Configuration from = plain.potential->iterate();
   double expected = 0;
   const Elements &e = *plain.elements;

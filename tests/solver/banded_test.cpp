@@ -13,6 +13,8 @@ struct Problem {
   Scene scene;
   DofMap dofs;
   BandedSystem system;
+  std::vector<char> wanted;
+  std::vector<double> shift;
   Band band;
   Planes metric;
   Eigen::MatrixXd dense; ///< over the unknowns
@@ -55,7 +57,9 @@ void fill(Problem &p, double diagonal) {
   for (const RodRange &rod : p.dofs.rods())
     for (int i = 0; i < rod.vertices; ++i)
       for (int a = 0; a < slot_size; ++a) p.metric[a][rod.slot(i)] = 1;
-  p.system = {&p.dofs, &p.band, &p.metric, std::vector<char>(p.dofs.rods().size(), true), std::vector<double>(p.dofs.rods().size(), 0)};
+  p.wanted.assign(p.dofs.rods().size(), true);
+  p.shift.assign(p.wanted.size(), 0);
+  p.system = {&p.dofs, p.dofs.all(), &p.band, &p.metric, &p.wanted, &p.shift};
 }
 
 int negativeEigenvalues(const Eigen::MatrixXd &a) { return int((Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(a).eigenvalues().array() < 0).count()); }
@@ -66,7 +70,7 @@ void expectSolvesAndCounts(const std::vector<int> &rods, double diagonal, bool h
   if (held) p.scene.supports = {hold(p.scene, 0, 0, Support::Kind::pin), hold(p.scene, 0, 3, Support::Kind::pin)};
   ASSERT_EQ(p.dofs.setUp(p.scene), PetscErrorCode(0));
   fill(p, diagonal);
-  BandedFactor banded(p.dofs);
+  BandedFactor banded(p.dofs, p.dofs.all());
   const Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(p.dense.rows(), -1, 2);
   Eigen::VectorXd x(b.size());
   for (int repeat = 0; repeat < 2; ++repeat) { // refactoring starts afresh
@@ -105,16 +109,16 @@ TEST(Banded, RodsThatAreNotWantedStandStill) {
   addRods(p.scene, std::vector<int>(2 * lanes, 6));
   ASSERT_EQ(p.dofs.setUp(p.scene), PetscErrorCode(0));
   fill(p, 12);
-  BandedFactor banded(p.dofs);
+  BandedFactor banded(p.dofs, p.dofs.all());
   Eigen::VectorXd b = Eigen::VectorXd::Constant(p.dense.rows(), 1.0), all(b.size()), some(b.size());
   banded.factor(p.system);
   banded.solve(b.data(), all.data());
-  for (std::size_t r = 0; r < p.system.wanted.size(); ++r) p.system.wanted[r] = r % 3 == 1;
+  for (std::size_t r = 0; r < p.wanted.size(); ++r) p.wanted[r] = r % 3 == 1;
   banded.factor(p.system);
   banded.solve(b.data(), some.data());
-  for (std::size_t r = 0; r < p.system.wanted.size(); ++r) {
+  for (std::size_t r = 0; r < p.wanted.size(); ++r) {
     const PetscInt u = p.dofs.unknown(p.dofs.rods()[r].slot(2), 1);
-    EXPECT_NEAR(some[u], p.system.wanted[r] ? all[u] : 0.0, 1e-14);
+    EXPECT_NEAR(some[u], p.wanted[r] ? all[u] : 0.0, 1e-14);
   }
 }
 
@@ -123,9 +127,9 @@ TEST(Banded, AShiftOfOneRodIsAddedToItsDiagonal) {
   addRods(p.scene, std::vector<int>(lanes + 1, 6));
   ASSERT_EQ(p.dofs.setUp(p.scene), PetscErrorCode(0));
   fill(p, -1);
-  BandedFactor banded(p.dofs);
-  p.system.shift[2] = 20; // more than the sum of the others in any row
-  p.system.shift[lanes] = 20;
+  BandedFactor banded(p.dofs, p.dofs.all());
+  p.shift[2] = 20; // more than the sum of the others in any row
+  p.shift[lanes] = 20;
   banded.factor(p.system);
   for (int r = 0; r <= lanes; ++r) EXPECT_EQ(banded.negativePivots(r) == 0, r == 2 || r == lanes) << r;
 }
@@ -142,7 +146,7 @@ TEST(Banded, CountsNeutralMotionsAndStandsStill) {
     p.band.entry(p.dofs.rods()[0], 0, 0)[i] = 1.3 * ((i > 0) + (i < 11));
     if (i < 11) p.band.entry(p.dofs.rods()[0], 0, slot_size)[i] = -1.3;
   }
-  BandedFactor banded(p.dofs);
+  BandedFactor banded(p.dofs, p.dofs.all());
   banded.factor(p.system);
   EXPECT_EQ(banded.negativePivots(0), 0);
   EXPECT_EQ(banded.neutralPivots(0), 1);

@@ -14,7 +14,7 @@ void requireDeadLoads(const Scene &scene);
 class ArcLength {
 public:
   /// The first step is as long as a load step of `settings.dt` is there; steps then adapt to four iterations.
-  ArcLength(NewtonSolver &solver, const LoopSettings &settings);
+  ArcLength(StepSolver &solver, const LoopSettings &settings);
 
   CriticalObserver on_critical; ///< told of limit points, before the step that passes them
   /// Follows the path from `state` until the load factor is 1 or the steps are used up. `finished` is false when a step of the smallest length
@@ -28,7 +28,7 @@ private:
     Planes unknowns;
     double factor = 0;
   };
-  NewtonSolver &solver_;
+  StepSolver &solver_;
   LoopSettings settings_;
   std::unique_ptr<Term> load_; ///< at load factor 1: its gradient is the derivative of the gradient by the load factor
   Planes metric_;

@@ -16,8 +16,10 @@ public:
 
   RetractionKind retraction = RetractionKind::length; ///< of moves that do not name another
 
-  /// Starts a step: the iterate is the start state with supports' frames (not yet their positions) moved to the end of the step.
+  /// Starts a step; then every rod has to be started before anything else is asked of it: its iterate is the start state with supports'
+  /// frames (not yet their positions) moved to the end of the step.
   void beginStep(const State &start, const Step &step);
+  void beginRod(const State &start, int rod);
   /// Whether a support has turned its edge past 180 degrees of twist in one step, where the measure `tan` has its barrier.
   bool beyondBarrier() const { return beyond_barrier_; }
   /// Changes the load factor (in statics also the time) of the step under way; the iterate stays.
@@ -28,19 +30,23 @@ public:
   const Elements &elements() const { return elements_; }
   const DofMap &dofs() const { return dofs_; }
   DofMap &dofs() { return dofs_; }
-  int rods() const { return int(elements_.rods.size()); }
+  RodSet all() const { return dofs_.all(); }
 
-  /// Increments that held vertices still have to make to reach their prescribed positions; zero elsewhere. True when there are any.
-  bool remainingMotion(Planes &increment) const;
+  /// Increments that held vertices of some rods still have to make to reach their prescribed positions; zero elsewhere. True when there are any.
+  bool remainingMotion(RodSet rods, Planes &increment) const;
 
   /// Energy of a rod [J]; +inf where the configuration is impossible. Rounding blurs it by `noise`: differences below decide nothing [J].
   struct RodEnergy {
     double value = std::numeric_limits<double>::infinity(), noise = 0;
   };
   RodEnergy rodEnergy(const Configuration &configuration, int rod) const;
-  double energy(const Configuration &configuration) const;
-  /// Gradient, equilibrium residual and Hessian band at the iterate, computed once per iterate.
-  const Derivatives &derivatives();
+  double energy(const Configuration &configuration, RodSet rods) const;
+  double energy(const Configuration &configuration) const { return energy(configuration, all()); }
+  /// Gradient, equilibrium residual and Hessian band at the iterates of some rods, computed once per iterate.
+  const Derivatives &derivatives(RodSet rods);
+  /// The same without the Hessian where it is not known yet.
+  const Derivatives &gradient(int rod);
+  const Derivatives &derivatives() { return derivatives(all()); }
   /// Derivatives of one rod with another Hessian than the step's; they stay until the rod moves.
   void assembleRod(int rod, HessianKind hessian);
   const Band &band() const { return derivatives_.band; }
@@ -53,13 +59,14 @@ public:
   /// Makes the trial of one rod, or of all, the iterate.
   void accept(const Configuration &trial, int rod);
   void accept(const Configuration &trial);
-  /// Axial forces of the iterate from its strains.
-  void resetAxialForces();
+  /// Axial forces of a rod's iterate from its strains.
+  void resetAxialForces(int rod);
 
   /// Moves to where the unknowns are `x` (displacements and spins since the step began) by the additive retraction.
-  void moveTo(const Planes &x);
+  void moveTo(const Planes &x, RodSet rods);
   /// Displacements and spins of the iterate since the step began.
-  void coordinates(Planes &x) const;
+  void coordinates(Planes &x, RodSet rods) const;
+  void coordinates(Planes &x) const { coordinates(x, all()); }
 
   /// Residual relative to the load scale, and the strain error of the axial forces.
   struct Residual {
@@ -84,10 +91,17 @@ private:
   AxialLaw axial_;
   std::vector<std::unique_ptr<Term>> terms_;
   Step step_;
-  State start_state_;
+  double start_time_ = 0;
+  struct Turned {
+    int rod, slot;
+    double angle; ///< [rad]
+    Frame end;
+  };
+  std::vector<Turned> turned_; ///< supports' frames that turn in this step
   Configuration start_, iterate_;
   Derivatives derivatives_;
-  std::vector<char> current_; ///< per rod: derivatives_ belong to the iterate
+  enum class Known : char { nothing, gradient, all };
+  std::vector<Known> known_; ///< per rod: what derivatives_ holds of the iterate
   std::vector<double> load_, force_scale_, length_, shortest_; ///< per rod: loads [N], or 0; the present scale of forces [N]; lengths [m]
   std::vector<double> bending_, shortest_cell_;                ///< per rod: sum of the cells' stiffnesses [N m]; [m]
   bool beyond_barrier_ = false;
@@ -95,7 +109,8 @@ private:
   double reachOf(const Configuration &configuration, const RodRange &rod) const;
   double steepnessOf(const Configuration &configuration, int rod) const;
   void turnSupports();
-  void setForceScales();
+  void followSupports(int rod);
+  double forceScale(const State &start, int rod) const;
 };
 
 } // namespace tendril

@@ -12,7 +12,7 @@ public:
   DofMap dofs;
   std::unique_ptr<Elements> elements;
   std::unique_ptr<IncrementalPotential> potential;
-  NewtonSolver solver;
+  StepSolver solver;
   State state;
 
   Simulation() = default;

@@ -73,8 +73,9 @@ private:
 
 /// Configuration of a state; supports' frames at `motion_time` of their prescribed motion.
 Configuration configurationOf(const State &state, const Scene &scene, const Elements &elements, double motion_time);
-/// The same into a configuration of that scene.
-void setConfiguration(const State &state, const Scene &scene, const Elements &elements, double motion_time, Configuration &c);
+/// Frames of all supports, and all of one rod, into a configuration of that scene.
+void setSupports(const Scene &scene, const Elements &elements, double motion_time, Configuration &c);
+void setRod(const State &state, const Elements &elements, int rod, Configuration &c);
 
 /// Present frame of a support.
 Frame supportFrame(const Support &support, double motion_time);
@@ -100,6 +101,17 @@ template <class T> std::array<FrameOf<T>, 2> cellFrames(const Configuration &c, 
       f[1].length = select(live, f[1].length, f[0].length);
     }
   return f;
+}
+
+/// Twist of a pack of edges since the start of a step, whole turns by continuity with the sum of the retractions; and those turns alone [rad].
+struct SpinOver {
+  Pack total, turns;
+};
+inline SpinOver spinOver(const Configuration &start, const Configuration &now, int slot) {
+  using std::floor;
+  const Pack principal = halfAngleBetween(start.frames<Pack>(slot), now.frames<Pack>(slot)).angle();
+  const Pack turns = Pack(2 * pi) * floor((read<Pack>(now[Configuration::spin] + slot) - principal) * Pack(0.5 / pi) + Pack(0.5));
+  return {principal + turns, turns};
 }
 
 /// Constants of a cell with its whole turns.

@@ -4,7 +4,7 @@
 
 #include "tendril/dynamics/bifurcation.hpp"
 #include "tendril/io/trajectory.hpp"
-#include "tendril/solver/newton.hpp"
+#include "tendril/solver/step_solver.hpp"
 
 #include <functional>
 
@@ -39,7 +39,7 @@ public:
   using Observer = std::function<PetscErrorCode(const State &, const Diagnostics &)>;
   StepControl control;
   CriticalObserver on_critical; ///< told of each critical point, before the step beyond it
-  TimeLoop(NewtonSolver &solver, const LoopSettings &settings) : solver_(solver), settings_(settings) {}
+  TimeLoop(StepSolver &solver, const LoopSettings &settings) : solver_(solver), settings_(settings) {}
 
   /// Advances `state` to the end. `finished` is false when dt_min was reached; `state` is then the last one accepted, bit for bit.
   PetscErrorCode run(State &state, const Observer &observe, bool *finished);
@@ -48,7 +48,7 @@ public:
   const std::string &failure() const { return failure_; }
 
 private:
-  NewtonSolver &solver_;
+  StepSolver &solver_;
   LoopSettings settings_;
   std::string failure_;
   double located_ = -1; ///< last critical load factor

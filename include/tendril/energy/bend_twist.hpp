@@ -120,6 +120,27 @@ template <class T> Matrix3<T> crossMatrix(const Vector3<T> &v) {
   return m;
 }
 
+/// Gradient of a cell's energy over its unknowns alone (see cellDerivatives).
+template <Measure measure, class T> std::array<T, cell_size> cellGradient(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell) {
+  const CellGeometry<T> g = cellGeometry(f0, f1, cell);
+  const Vector3<T> &t0 = f0.tangent, &t1 = f1.tangent;
+  const T i0 = cell.free[0] / f0.length, i1 = cell.free[1] / f1.length;
+  AngleFactor<T> a{T(1.0), T(0.0), T(0.0)};
+  if constexpr (measure == Measure::angle) a = angleFactor<T>((g.kappa1 * g.kappa1 + g.kappa2 * g.kappa2) * T(0.25));
+  const T force1 = cell.stiffness[0] * (g.stretch * a.value * g.kappa1 - cell.rest[0]), force2 = cell.stiffness[1] * (g.stretch * a.value * g.kappa2 - cell.rest[1]);
+  const T along = force1 * g.kappa1 + force2 * g.kappa2, turning = T(0.5) * a.first * along;
+  const T f1st = g.stretch * (force1 * a.value + turning * g.kappa1), f2nd = g.stretch * (force2 * a.value + turning * g.kappa2);
+  const std::array<T, 3> twist = twistMeasure<measure>(g.half, cell);
+  const T f_twist = cell.stiffness[2] * (twist[0] - cell.rest[2]) * twist[1];
+  // Moving the directors turns p = f1 d1 + f2 d2 with the first frame, and within it by half the twist.
+  const Vector3<T> p = g.d1 * f1st + g.d2 * f2nd, mean = (t0 + t1) / g.chi;
+  const T bp = g.binormal.dot(p), turn = f1st * g.kappa2 - f2nd * g.kappa1, two_over_chi = T(2.0) / g.chi, half_twist = T(0.5) * f_twist + T(0.25) * turn;
+  const Vector3<T> e0 = (t1.cross(p) * two_over_chi - mean * bp) * i0 + g.binormal * (half_twist * i0) + t0 * (a.value * along * cell.weight[0] * cell.free[0]);
+  const Vector3<T> e1 = (t0.cross(p) * two_over_chi + mean * bp) * (-i1) + g.binormal * (half_twist * i1) + t1 * (a.value * along * cell.weight[1] * cell.free[1]);
+  const T theta0 = (T(0.5) * turn - f_twist) * cell.free[0], theta1 = (T(0.5) * turn + f_twist) * cell.free[1];
+  return {-e0[0], -e0[1], -e0[2], theta0, e0[0] - e1[0], e0[1] - e1[1], e0[2] - e1[2], theta1, e1[0], e1[1], e1[2]};
+}
+
 /// Gradient and Hessian of a cell's energy, pulled back by the retraction at the current frames: exact and symmetric.
 template <Measure measure, class T>
 void cellDerivatives(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell, CellDerivatives<T> &out) {

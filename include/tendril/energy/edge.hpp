@@ -29,16 +29,16 @@ template <class T> Matrix3<T> stretchHessian(const FrameOf<T> &f, const T &stiff
 /// its present director. It depends on the end points of the step only, not on the iterates between.
 template <class T> T twistIncrement(const FrameOf<T> &start, const FrameOf<T> &now) { return halfAngleBetween(start, now).angle(); }
 
-/// Gradient (4) over (e, theta) and Hessian (upper triangle of 4x4, row by row) of weight/2 (twist increment - target)^2.
+/// Gradient (4) over (e, theta) and Hessian (upper triangle of 4x4, row by row) of weight/2 (twist increment - target)^2, given that difference.
 template <class T> struct TwistInertiaDerivatives {
   std::array<T, 4> gradient;
   std::array<T, 10> hessian;
 };
-template <class T> TwistInertiaDerivatives<T> twistInertia(const FrameOf<T> &start, const FrameOf<T> &now, const T &weight, const T &target) {
+template <class T> TwistInertiaDerivatives<T> twistInertia(const FrameOf<T> &start, const FrameOf<T> &now, const T &weight, const T &difference) {
   const T chi = T(1.0) + start.tangent.dot(now.tangent), inverse = T(1.0) / now.length;
   const Vector3<T> b = start.tangent.cross(now.tangent) * (T(2.0) / chi);
   const Vector3<T> mean = (start.tangent + now.tangent) / chi;
-  const T force = weight * (twistIncrement(start, now) - target);
+  const T force = weight * difference;
   const Vector3<T> g = b * (T(0.5) * inverse);
   const Vector3<T> q = (now.tangent + mean) * (T(-0.25) * inverse * inverse * force);
   TwistInertiaDerivatives<T> d;

@@ -10,8 +10,8 @@
 namespace tendril {
 
 /// Which second derivatives a Hessian holds: all of them; without the compression of edges, which cannot make it indefinite then; or without the
-/// second derivatives of the strains and without compression (what other codes use: slower, never indefinite; for comparison).
-enum class HessianKind { exact, uncompressed, gauss_newton };
+/// second derivatives of the strains and without compression (what other codes use: slower, never indefinite; for comparison). Or none, where only the gradient is wanted.
+enum class HessianKind { exact, uncompressed, gauss_newton, none };
 
 /// One step to be taken: from the start state to `time`.
 struct Step {
@@ -34,8 +34,8 @@ struct Derivatives {
 class Term {
 public:
   virtual ~Term() = default;
-  /// Called once before the iterations of a step. `start` stays in place until the next.
-  virtual void beginStep(const State & /*state*/, const Configuration & /*start*/, const Step & /*step*/) {}
+  /// Called for every rod before the iterations of a step. `start` stays in place until the next.
+  virtual void beginStep(const State & /*state*/, const Configuration & /*start*/, const Step & /*step*/, int /*rod*/) {}
   /// Called whenever the iterate of a rod has moved.
   virtual void moveIterate(const Configuration & /*iterate*/, int /*rod*/) {}
   /// Called when the load factor changes within a step.
@@ -50,7 +50,7 @@ public:
 class AxialLaw {
 public:
   AxialLaw(const Scene &scene, const Elements &elements);
-  void beginStep(const Configuration &start, const Step &step);
+  void beginStep(const Configuration &start, const Step &step, int rod);
   const double *stiffness() const { return planes_[0]; } ///< [N]
   const double *rest() const { return planes_[1]; }
 

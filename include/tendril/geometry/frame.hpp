@@ -53,9 +53,12 @@ template <class T> HalfAngle<T> halfAngleBetween(const FrameOf<T> &a, const Fram
 }
 
 /// Orthonormal director for an edge: `director` made normal to `tangent` and of unit length.
-inline Vec3 orthonormalised(const Vec3 &director, const Vec3 &tangent) {
-  return (director - tangent * director.dot(tangent)).normalized();
+template <class T> Vector3<T> orthonormalised(const Vector3<T> &director, const Vector3<T> &tangent) {
+  using std::sqrt;
+  const Vector3<T> d = director - tangent * director.dot(tangent);
+  return d / sqrt(d.squaredNorm());
 }
+inline Vec3 orthonormalised(const Vec3 &director, const Vec3 &tangent) { return orthonormalised<double>(director, tangent); }
 
 /// Some unit vector normal to the unit vector `t`, chosen continuously almost everywhere and the same on every machine.
 inline Vec3 anyNormal(const Vec3 &t) {

@@ -29,6 +29,11 @@ struct RodRange {
   int edgeEnd() const { return first_slot + edges; }
 };
 
+/// Rods that follow each other in the scene, [begin, end).
+struct RodSet {
+  int begin, end;
+};
+
 /// Unknowns of a slot: x, y, z, twist.
 inline constexpr int slot_size = 4;
 /// Couplings of an unknown to those after it, itself included: the 11 unknowns of a cell.
@@ -82,23 +87,28 @@ public:
   /// Puts the band into the matrix, both triangles.
   PetscErrorCode fillMatrix(const Band &band, Mat matrix);
 
-  /// Copies of the first vertices and edge of closed rods behind their last.
-  void copyBehindRings(Planes &increment) const;
+  /// Copies of the first vertices and edge of a closed rod behind its last.
+  void copyBehindRing(const RodRange &rod, Planes &increment) const;
   /// Adds what was summed into the copies behind a ring to the slots they stand for.
   void fold(const RodRange &rod, Planes &sums) const;
   void fold(const RodRange &rod, Band &band) const;
 
-  /// out = values of the unknowns, rod by rod; rods not in `wanted` get zero.
-  PetscErrorCode gather(const Planes &values, Vec out, const std::vector<char> *wanted = nullptr) const;
-  /// Values of all slots from unknowns: zero where held, copies behind rings included.
-  PetscErrorCode scatter(Vec in, Planes &values) const;
+  /// Unknowns of some rods are numbered one after the other.
+  PetscInt firstUnknown(RodSet rods) const { return unknown_begin_[rods.begin]; }
+  PetscInt unknowns(RodSet rods) const { return unknown_begin_[rods.end] - unknown_begin_[rods.begin]; }
+  RodSet all() const { return {0, int(rods_.size())}; }
+
+  /// out = values of the unknowns of some rods; of these, rods not `wanted` (by scene order) get zero.
+  PetscErrorCode gather(const Planes &values, RodSet rods, Vec out, const std::vector<char> *wanted = nullptr) const;
+  /// Values of the rods' slots from unknowns: zero where held, copies behind rings included.
+  PetscErrorCode scatter(Vec in, RodSet rods, Planes &values) const;
 
 private:
   std::vector<RodRange> rods_;
   int vertices_ = 0, edges_ = 0, slots_ = 0;
   PetscInt unknowns_ = 0;
   std::vector<bool> held_;
-  std::vector<PetscInt> unknown_;
+  std::vector<PetscInt> unknown_, unknown_begin_;
   std::vector<std::size_t> source_; ///< entries of the matrix in its own order: where their value is in the band
   std::vector<double> entries_;
   OwnedDM dm_;

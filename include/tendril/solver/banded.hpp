@@ -11,25 +11,26 @@ namespace tendril {
 /// What there is to factor: band + shift x metric of the rods that are wanted.
 struct BandedSystem {
   const DofMap *dofs = nullptr;
+  RodSet rods{0, 0};
   const Band *band = nullptr;
   const Planes *metric = nullptr;
-  std::vector<char> wanted;  ///< per rod; the others are left out, and a solve gives them zero
-  std::vector<double> shift; ///< per rod
+  const std::vector<char> *wanted = nullptr;  ///< per rod of the scene; the others are left out, and a solve gives them zero
+  const std::vector<double> *shift = nullptr; ///< per rod of the scene
 };
 
 class BandedFactor {
 public:
-  explicit BandedFactor(const DofMap &dofs);
+  BandedFactor(const DofMap &dofs, RodSet rods);
 
   void factor(const BandedSystem &system);
-  /// By the unknowns of all rods; x may be b.
+  /// By the unknowns of the rods; x may be b.
   void solve(const PetscScalar *b, PetscScalar *x);
 
-  int rods() const { return int(order_.size()); }
-  int negativePivots(int rod) const { return negative_[rod]; }
+  RodSet rods() const { return rods_; }
+  int negativePivots(int rod) const { return negative_[rod - rods_.begin]; }
   /// Pivots lost in rounding (|pivot| within a few epsilon of its diagonal): motions that cost no energy. They are replaced by a small
   /// positive number, so that a solve does not move along them.
-  int neutralPivots(int rod) const { return neutral_[rod]; }
+  int neutralPivots(int rod) const { return neutral_[rod - rods_.begin]; }
   std::size_t bytes() const { return (band_.size() + far_.size() + rows_.size()) * sizeof(double); }
 
 private:
@@ -41,13 +42,14 @@ private:
     std::size_t band, far; ///< where its factor begins
   };
   const DofMap &dofs_;
+  RodSet rods_;
   std::vector<int> order_;              ///< rods by shape
   std::vector<std::vector<int>> fixed_; ///< per rod: rows that are held or do not exist
   std::vector<Group> groups_;
   std::vector<int> negative_, neutral_;
-  AlignedVector band_, far_, rows_;
+  AlignedVector band_, far_, rows_, copy_;
 
-  void plan(const std::vector<char> &wanted);
+  void plan(const char *wanted);
   template <class T> void factorGroup(const Group &group, const BandedSystem &system);
   template <class T> void solveGroup(const Group &group, const PetscScalar *b, PetscScalar *x);
 };

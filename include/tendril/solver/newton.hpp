@@ -23,6 +23,8 @@ struct NewtonReport {
   IncrementalPotential::Residual residual;
   std::vector<double> history; ///< force residual, relative to the load scale, at every iterate
   std::string reason;        ///< in words
+  /// Adds the report of another block of rods.
+  void include(const NewtonReport &block);
 };
 
 /// Whether an iterate is an answer: each residual below `rtol` of its scale, or below what rounding leaves.
@@ -31,22 +33,35 @@ bool isSmall(const IncrementalPotential::Residual &residual, double rtol);
 /// Which equilibria are answers in statics: minima, or any, reached by Newton's own full steps, for following a branch.
 enum class Seek { minimum, equilibrium };
 
+/// What a solve keeps of rods and slots, for all solvers of a scene: each works on its own rods only.
+struct NewtonWork {
+  explicit NewtonWork(const IncrementalPotential &potential);
+  std::vector<char> wanted;  ///< rods that have not converged yet
+  std::vector<double> shift, last_shift; ///< of the diagonal of indefinite Hessians, now and when it was last needed
+  std::vector<int> negative; ///< pivots; of all rods together where the linear solver does not tell them apart
+  std::vector<IncrementalPotential::RodEnergy> energy; ///< at the iterate, ...
+  std::vector<char> energy_known;                      ///< ... where it has been computed
+  std::vector<IncrementalPotential::Residual> residual;
+  std::vector<char> moving;  ///< rods whose supports have not reached their places
+  Planes increment, coordinates, motion, metric;
+  Configuration trial;
+};
+
+/// Solves for some rods that nothing joins to others.
 class NewtonSolver {
 public:
   /// Creates SNES and its parts and reads -snes_*, -ksp_*, -pc_*, -mat_* options.
-  PetscErrorCode setUp(IncrementalPotential &potential);
-  /// Minimises the potential of the step. The potential's iterate is the answer when `report` says converged.
+  PetscErrorCode setUp(IncrementalPotential &potential, NewtonWork &work, RodSet rods);
+  /// Minimises the potential of the step, which has begun. The potential's iterate is the answer when `report` says converged.
   /// \param guess displacements and spins to start from instead of the start state
-  PetscErrorCode solve(const State &start, const Step &step, NewtonReport *report, Seek seek = Seek::minimum, const Planes *guess = nullptr);
-  /// Sets the linear solver up as a step would, so that its options have been asked for before the first step.
-  PetscErrorCode rehearse(const State &start, const Step &step);
+  PetscErrorCode solve(const State &start, NewtonReport *report, Seek seek, const Planes *guess);
   /// Factors the Hessian at the iterate and counts negative pivots; -1 when it cannot be factored.
   PetscErrorCode inertiaAtIterate(int *negative);
   /// Solves with the matrix factored last.
   PetscErrorCode solveLinear(const Planes &right, Planes &solution);
 
   SNES snes() const { return snes_; }
-  IncrementalPotential &potential() { return *potential_; }
+  bool isBanded() const { return banded_; }
 
   // What SNES calls.
   PetscErrorCode evaluate(Vec x, Vec f);
@@ -56,24 +71,19 @@ public:
 
 private:
   IncrementalPotential *potential_ = nullptr;
+  RodSet rods_{0, 0};
   OwnedSNES snes_;
-  BandedSystem system_; ///< its wanted rods are those that have not converged yet
+  NewtonWork *work_ = nullptr;
+  BandedSystem system_;
   OwnedMat jacobian_;
   bool banded_ = true;
   OwnedVec x_, f_, right_, solution_;
   Vec iterate_vec_ = nullptr; ///< vector that holds the coordinates of the potential's iterate, ...
   PetscObjectState iterate_state_ = 0; ///< ... and its state when they were written
   NewtonReport report_;
-  Configuration trial_;
-  Planes increment_, coordinates_, motion_, metric_;
-  std::vector<IncrementalPotential::RodEnergy> energy_; ///< per rod, at the iterate
-  std::vector<char> energy_known_;
-  std::vector<int> negative_;   ///< pivots per rod; of all together where the solver does not tell rods apart
-  std::vector<double> last_shift_;
   Seek seek_ = Seek::minimum;
   double sharpness_ = 1;
-  std::vector<IncrementalPotential::Residual> residual_; ///< per rod
-  std::vector<char> moving_; ///< per rod: its supports have not reached their places
+  double likely_ = 0; ///< residual from which the next iterate is likely an answer
 
   PetscErrorCode newton(const char **failure);
   PetscErrorCode moveTo(Vec x);
@@ -88,9 +98,10 @@ private:
   bool searchRod(int rod, double *lambda);
   PetscErrorCode findBucklingMode(bool *found);
   PetscErrorCode escapeSaddle(bool *left);
-  void predict(const State &start, const Step &step);
+  void predict(const State &start);
   const IncrementalPotential::RodEnergy &energyAtIterate(int rod);
-  void forgetEnergies() { std::fill(energy_known_.begin(), energy_known_.end(), false); }
+  void forgetEnergies() { fill(work_->energy_known, false); }
+  template <class Value, class Same> void fill(std::vector<Value> &values, Same value) { std::fill(values.begin() + rods_.begin, values.begin() + rods_.end, value); }
   std::string nearBarrier() const;
 };
 

@@ -1,0 +1,41 @@
+#pragma once
+/// \file step_solver.hpp
+/// One implicit step of the whole scene. Rods that nothing joins are independent of each other: they are solved in blocks small enough to stay in
+/// the cache, a SNES each. Other linear solvers than `banded` get the whole scene as one system.
+
+#include "tendril/solver/newton.hpp"
+
+#include <deque>
+#include <optional>
+
+namespace tendril {
+
+/// Whether independent rods may be solved one block after the other, or must form one system (paths of equilibria share a load factor).
+enum class Coupling { none, load };
+
+class StepSolver {
+public:
+  PetscErrorCode setUp(IncrementalPotential &potential, Coupling coupling = Coupling::none);
+  /// Minimises the potential of the step. The potential's iterate is the answer when `report` says converged; iterations are the most of any block.
+  /// \param guess displacements and spins to start from instead of the start state
+  PetscErrorCode solve(const State &start, const Step &step, NewtonReport *report, Seek seek = Seek::minimum, const Planes *guess = nullptr);
+  /// Starts a step without solving it.
+  void begin(const State &start, const Step &step);
+  /// Sets the linear solvers up as a step would, so that their options have been asked for before the first step.
+  PetscErrorCode rehearse(const State &start, const Step &step);
+  /// Factors the Hessian at the iterate and counts negative pivots; -1 when it cannot be factored.
+  PetscErrorCode inertiaAtIterate(int *negative);
+
+  IncrementalPotential &potential() { return *potential_; }
+  std::deque<NewtonSolver> &blocks() { return blocks_; }
+  /// The solver of the first block.
+  NewtonSolver &front() { return blocks_.front(); }
+  SNES snes() const { return blocks_.front().snes(); }
+
+private:
+  IncrementalPotential *potential_ = nullptr;
+  std::optional<NewtonWork> work_;
+  std::deque<NewtonSolver> blocks_;
+};
+
+} // namespace tendril

@@ -1,0 +1,95 @@
+#include "tendril/solver/step_solver.hpp"
+
+#include <algorithm>
+
+namespace tendril {
+namespace {
+
+/// Cuts the scene into blocks of at least so many edges (about 2 kB each), and at least a pack of rods to factor together.
+std::vector<RodSet> blocksOf(const std::vector<RodRange> &rods) {
+  constexpr int block_edges = 800;
+  std::vector<RodSet> blocks;
+  int begin = 0, edges = 0;
+  for (int r = 0; r < int(rods.size()); ++r) {
+    edges += rods[r].edges;
+    if ((edges < block_edges || (r + 1 - begin) % lanes != 0) && edges < 4 * block_edges && r + 1 < int(rods.size())) continue;
+    blocks.push_back({begin, r + 1});
+    begin = r + 1;
+    edges = 0;
+  }
+  return blocks;
+}
+
+} // namespace
+
+PetscErrorCode StepSolver::setUp(IncrementalPotential &potential, Coupling coupling) {
+  PetscFunctionBeginUser;
+  potential_ = &potential;
+  work_.emplace(potential);
+  blocks_.clear();
+  PetscCall(blocks_.emplace_back().setUp(potential, *work_, potential.all()));
+  if (coupling == Coupling::load || !front().isBanded()) PetscFunctionReturn(0);
+  const std::vector<RodSet> blocks = blocksOf(potential.elements().rods);
+  if (blocks.size() == 1) PetscFunctionReturn(0);
+  blocks_.clear();
+  for (const RodSet &block : blocks) PetscCall(blocks_.emplace_back().setUp(potential, *work_, block));
+  PetscFunctionReturn(0);
+}
+
+void StepSolver::begin(const State &start, const Step &step) {
+  potential_->beginStep(start, step);
+  for (int r = 0; r < potential_->all().end; ++r) potential_->beginRod(start, r);
+}
+
+PetscErrorCode StepSolver::solve(const State &start, const Step &step, NewtonReport *report, Seek seek, const Planes *guess) {
+  PetscFunctionBeginUser;
+  potential_->beginStep(start, step);
+  *report = {};
+  report->converged = true;
+  report->reason = "converged";
+  for (NewtonSolver &block : blocks_) {
+    NewtonReport one;
+    PetscCall(block.solve(start, &one, seek, guess));
+    report->include(one);
+    if (!one.converged) break;
+  }
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode StepSolver::rehearse(const State &start, const Step &step) {
+  int negative;
+  PetscFunctionBeginUser;
+  begin(start, step);
+  PetscCall(inertiaAtIterate(&negative));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode StepSolver::inertiaAtIterate(int *negative) {
+  PetscFunctionBeginUser;
+  *negative = 0;
+  for (NewtonSolver &block : blocks_) {
+    int one;
+    PetscCall(block.inertiaAtIterate(&one));
+    *negative = one < 0 || *negative < 0 ? -1 : *negative + one;
+  }
+  PetscFunctionReturn(0);
+}
+
+void NewtonReport::include(const NewtonReport &block) {
+  iterations = std::max(iterations, block.iterations);
+  edge_iterations += block.edge_iterations;
+  trials += block.trials;
+  shifts += block.shifts;
+  negative_pivots += block.negative_pivots;
+  neutral_pivots += block.neutral_pivots;
+  first_negative_pivots += block.first_negative_pivots;
+  escapes += block.escapes;
+  residual.include(block.residual);
+  if (history.size() < block.history.size()) history.resize(block.history.size(), 0.0);
+  for (std::size_t k = 0; k < block.history.size(); ++k) history[k] = std::max(history[k], block.history[k]);
+  if (block.converged) return;
+  converged = false;
+  reason = block.reason;
+}
+
+} // namespace tendril
