@@ -14,7 +14,10 @@ namespace {
 
 std::string joined(const std::vector<std::string> &words) {
   std::string text;
-  for (const std::string &w : words) text += (text.empty() ? "" : ",") + w;
+  for (const std::string &w : words) {
+    if (!text.empty()) text += ',';
+    text += w;
+  }
   return text;
 }
 

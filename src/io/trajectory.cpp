@@ -3,9 +3,10 @@
 #include "tendril/energy/derived.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <filesystem>
 #include <fstream>
-#include <iomanip>
+#include <sstream>
 
 namespace tendril {
 namespace {
@@ -110,7 +111,10 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
                                    const std::set<std::string> &wanted, bool dynamic)
     : scene_(scene), elements_(elements), dynamic_(dynamic), folder_(folder), rods_(elements.rods.size()), vertices_(int(elements.mass.size())),
       edges_(int(elements.vertex0.size())), csv_(folder + "/diagnostics.csv"), file_(Hdf5File::create(folder + "/trajectory.h5")) {
-  for (const std::string &name : Diagnostics::names()) csv_rows_ += (csv_rows_.empty() ? "" : ",") + name;
+  for (const std::string &name : Diagnostics::names()) {
+    if (!csv_rows_.empty()) csv_rows_ += ',';
+    csv_rows_ += name;
+  }
   csv_rows_ += '\n';
   writeHeader(scene, elements, provenance);
   file_.createGroup("state");
@@ -208,9 +212,11 @@ void TrajectoryWriter::writeFrame(const State &state) {
   step_->append(&step);
   time_->append(&state.time);
   times_.push_back(state.time);
-  if ((times_.size() & (times_.size() - 1)) == 0) { // now and then: a killed run keeps a usable one
+  if (times_.size() >= 2 * described_ && Clock::now() - described_at_ > 4 * patience) { // now and then: a killed run keeps a usable one
     flush();
     writeXdmf();
+    described_ = times_.size();
+    described_at_ = Clock::now();
   } else
     flushWhenDue();
 }
@@ -220,7 +226,8 @@ void TrajectoryWriter::writeDiagnostics(const Diagnostics &row) {
   char text[32];
   for (std::size_t k = 0; k < values.size(); ++k) {
     diagnostics_[k]->append(&values[k]);
-    csv_rows_.append(text, std::snprintf(text, sizeof text, k ? ",%.17g" : "%.17g", values[k]));
+    if (k) csv_rows_ += ',';
+    csv_rows_.append(text, std::to_chars(text, text + sizeof text, values[k]).ptr); // as many digits as bring the number back
   }
   csv_rows_ += '\n';
   flushWhenDue();
@@ -251,67 +258,84 @@ void TrajectoryWriter::flushWhenDue() {
   if (waiting > most_waiting || Clock::now() - flushed_ > patience) flush();
 }
 
-/// The frames as slabs of the HDF5 datasets, in the form of ParaView's "XDMF Reader". Two blocks over the same points:
-/// `rods`, a polyline each, with the fields of vertices; `edges`, a segment each, with those of edges as cell data as well.
+/// One frame of a block, in which the mark '@' stands for its number and '#' for its time. `rods`: a polyline each, with the fields of vertices;
+/// `edges`: a segment each, with those of edges as cell data as well.
+std::string TrajectoryWriter::xdmfFrame(bool edges) const {
+  std::ostringstream out;
+  auto dataset = [&](const std::string &name, const std::string &shape, const char *type, int bytes) {
+    out << "<DataItem Dimensions=\"" << shape << "\" NumberType=\"" << type << "\" Precision=\"" << bytes << "\" Format=\"HDF\">trajectory.h5:/" << name
+        << "</DataItem>\n";
+  };
+  // One frame out of a dataset (nt, n[, c]), or one of its components. ParaView takes the first text in here as the geometry's name: it keeps
+  // what it read under that name, and complains when there is none.
+  auto frameOf = [&](const Field &f, int component = -1) {
+    const std::string n = std::to_string(f.place == On::vertices ? vertices_ : edges_);
+    std::string shape = n;
+    if (f.components > 1) shape.append(" ").append(std::to_string(f.components));
+    const std::string part = component < 0 ? shape : n + " 1";
+    out << "     <DataItem ItemType=\"HyperSlab\" Dimensions=\"" << (component < 0 ? shape : n) << "\"><!-- frame @ --><DataItem Dimensions=\"3 "
+        << (f.components > 1 ? 3 : 2) << "\" Format=\"XML\">@ 0 ";
+    if (f.components > 1) out << std::max(component, 0) << " 1 ";
+    out << "1 1 1 " << part << "</DataItem>";
+    dataset(std::string("state/") + f.name, std::to_string(times_.size()) + " " + shape, "Float", 8);
+    out << "     </DataItem>\n";
+  };
+  auto attribute = [&](const Field &f, int component = -1) {
+    out << "    <Attribute Name=\"" << f.name;
+    if (component >= 0) out << "_" << component + 1;
+    out << "\" AttributeType=\"" << (f.components == 3 ? "Vector" : "Scalar") << "\" Center=\"" << (f.place == On::vertices ? "Node" : "Cell") << "\">\n";
+    frameOf(f, component);
+    out << "    </Attribute>\n";
+  };
+  out << "   <Grid GridType=\"Uniform\">\n    <Time Value=\"#\"/>\n    <Topology TopologyType=";
+  if (edges) {
+    out << "\"Polyline\" NodesPerElement=\"2\" NumberOfElements=\"" << edges_ << "\">";
+    dataset("topology/edges", std::to_string(edges_) + " 2", "Int", 4);
+  } else {
+    out << "\"Mixed\" NumberOfElements=\"" << rods_ << "\">";
+    dataset("topology/polylines", std::to_string(polyline_entries_), "Int", 4);
+  }
+  out << "    </Topology>\n    <Geometry GeometryType=\"XYZ\">\n";
+  frameOf(fields[0]);
+  out << "    </Geometry>\n";
+  for (std::size_t k = 1; k < state_.size(); ++k) {
+    const Field &f = fields[k];
+    if (!state_[k] || f.place == On::cells || (f.place == On::edges && !edges)) continue;
+    if (f.components != 2)
+      attribute(f);
+    else
+      for (const int component : {0, 1}) attribute(f, component); // ParaView knows scalars and vectors of three
+  }
+  out << "   </Grid>\n";
+  return out.str();
+}
+
+/// The frames as slabs of the HDF5 datasets, in the form of ParaView's "XDMF Reader".
 void TrajectoryWriter::writeXdmf() const {
   const std::string path = folder_ + "/trajectory.xdmf";
-  {
-    std::ofstream out(path + ".part");
-    out << std::setprecision(17);
-    const std::size_t nt = times_.size();
-    auto dataset = [&](const std::string &name, const std::string &shape, const char *type, int bytes) {
-      out << "<DataItem Dimensions=\"" << shape << "\" NumberType=\"" << type << "\" Precision=\"" << bytes << "\" Format=\"HDF\">trajectory.h5:/" << name
-          << "</DataItem>\n";
-    };
-    // One frame out of a dataset (nt, n[, c]), or one of its components. ParaView takes the first text in here as the geometry's name: it keeps
-    // what it read under that name, and complains when there is none.
-    auto frameOf = [&](const Field &f, std::size_t frame, int component = -1) {
-      const std::string n = std::to_string(f.place == On::vertices ? vertices_ : edges_);
-      const std::string shape = n + (f.components > 1 ? " " + std::to_string(f.components) : ""), part = component < 0 ? shape : n + " 1";
-      out << "     <DataItem ItemType=\"HyperSlab\" Dimensions=\"" << (component < 0 ? shape : n) << "\"><!-- frame " << frame << " --><DataItem Dimensions=\"3 "
-          << (f.components > 1 ? 3 : 2) << "\" Format=\"XML\">" << frame << " 0 ";
-      if (f.components > 1) out << std::max(component, 0) << " 1";
-      out << " 1 1 1 " << part << "</DataItem>";
-      dataset(std::string("state/") + f.name, std::to_string(nt) + " " + shape, "Float", 8);
-      out << "     </DataItem>\n";
-    };
-    // ParaView knows scalars and vectors of three: pairs are two scalars.
-    auto attributeOf = [&](const Field &f, std::size_t frame, int component = -1) {
-      out << "    <Attribute Name=\"" << f.name << (component < 0 ? "" : "_" + std::to_string(component + 1)) << "\" AttributeType=\""
-          << (f.components == 3 ? "Vector" : "Scalar") << "\" Center=\"" << (f.place == On::vertices ? "Node" : "Cell") << "\">\n";
-      frameOf(f, frame, component);
-      out << "    </Attribute>\n";
-    };
-    out << "<?xml version=\"1.0\"?>\n<!-- In ParaView choose \"XDMF Reader\"; its Xdmf3 readers do not know HyperSlab. -->\n<Xdmf Version=\"3.0\">\n "
-           "<Domain>\n";
-    for (const bool edges : {false, true}) {
-      out << "  <Grid Name=\"" << (edges ? "edges" : "rods") << "\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
-      for (std::size_t frame = 0; frame < nt; ++frame) {
-        out << "   <Grid GridType=\"Uniform\">\n    <Time Value=\"" << times_[frame] << "\"/>\n    <Topology TopologyType=";
-        if (edges) {
-          out << "\"Polyline\" NodesPerElement=\"2\" NumberOfElements=\"" << edges_ << "\">";
-          dataset("topology/edges", std::to_string(edges_) + " 2", "Int", 4);
-        } else {
-          out << "\"Mixed\" NumberOfElements=\"" << rods_ << "\">";
-          dataset("topology/polylines", std::to_string(polyline_entries_), "Int", 4);
-        }
-        out << "    </Topology>\n    <Geometry GeometryType=\"XYZ\">\n";
-        frameOf(fields[0], frame);
-        out << "    </Geometry>\n";
-        for (std::size_t k = 1; k < state_.size(); ++k) {
-          const Field &f = fields[k];
-          if (!state_[k] || f.place == On::cells || (f.place == On::edges && !edges)) continue;
-          if (f.components != 2)
-            attributeOf(f, frame);
-          else
-            for (const int component : {0, 1}) attributeOf(f, frame, component);
-        }
-        out << "   </Grid>\n";
+  std::ofstream out(path + ".part");
+  out << "<?xml version=\"1.0\"?>\n<!-- In ParaView choose \"XDMF Reader\"; its Xdmf3 readers do not know HyperSlab. -->\n<Xdmf Version=\"3.0\">\n <Domain>\n";
+  for (const bool edges : {false, true}) {
+    out << "  <Grid Name=\"" << (edges ? "edges" : "rods") << "\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
+    const std::string pattern = xdmfFrame(edges);
+    std::string text;
+    for (std::size_t frame = 0; frame < times_.size(); ++frame) {
+      char time[32];
+      std::snprintf(time, sizeof time, "%.17g", times_[frame]);
+      const std::string number = std::to_string(frame);
+      text.clear();
+      for (std::size_t at = 0; at < pattern.size();) {
+        const std::size_t mark = std::min(pattern.find_first_of("@#", at), pattern.size());
+        text.append(pattern, at, mark - at);
+        if (mark < pattern.size()) text += pattern[mark] == '@' ? number.c_str() : time;
+        at = mark + 1;
       }
-      out << "  </Grid>\n";
+      out << text;
     }
-    out << " </Domain>\n</Xdmf>\n";
+    out << "  </Grid>\n";
   }
+  out << " </Domain>\n</Xdmf>\n";
+  out.close();
   std::error_code ignored;
   std::filesystem::rename(path + ".part", path, ignored);
 }

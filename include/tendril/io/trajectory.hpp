@@ -70,10 +70,12 @@ private:
   std::vector<std::unique_ptr<Hdf5Series>> state_; ///< of all fields in their order; null where one is not written
   std::unique_ptr<Hdf5Series> time_, step_, critical_;
   std::vector<std::unique_ptr<Hdf5Series>> diagnostics_;
-  Clock::time_point flushed_ = Clock::now();
+  Clock::time_point flushed_, described_at_; ///< long ago: the first frame goes to the files at once
+  std::size_t described_ = 0;                ///< frames in the XDMF file
 
   void writeHeader(const Scene &scene, const Elements &elements, const Provenance &provenance);
   void flushWhenDue();
+  std::string xdmfFrame(bool edges) const;
   void writeXdmf() const;
 };
 
