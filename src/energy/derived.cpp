@@ -1,3 +1,5 @@
+// GCC 12 warns of AVX-512 loads of eight numbers from Eigen's vectors of three, which are never made.
+#pragma GCC diagnostic ignored "-Warray-bounds"
 #include "tendril/energy/derived.hpp"
 
 #include "tendril/energy/edge.hpp"
