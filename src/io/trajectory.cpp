@@ -123,6 +123,7 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
     if (std::string(f.name) != "position" && !wanted.count(f.name)) continue;
     if (f.place == On::cells && std::find(elements.measure.begin(), elements.measure.end(), Measure::angle) == elements.measure.end()) continue;
     std::vector<hsize_t> slab{hsize_t(sizes(elements)[std::size_t(f.place)])};
+    if (slab[0] == 0) continue; // cables have no cells
     if (f.components > 1) slab.push_back(f.components);
     state_.back() = std::make_unique<Hdf5Series>(file_, std::string("state/") + f.name, slab);
   }

@@ -109,3 +109,16 @@ with tempfile.TemporaryDirectory() as tmp:
                     slab = h5[path][tuple(slice(s, s + n) for s, n in zip(start, count))]
                 assert np.array_equal(slab.reshape(f[field][k].shape), f[field][k]), f"{field} of frame {k}"
     print("XDMF leads to", len(t), "frames")
+
+    # Cables have no cells, and so no whole turns to write.
+    with open(tmp + "/cable.yaml", "w") as f:
+        f.write("""simulation: {dt: 0.01, t_end: 0.02}
+rods:
+  - {line: {from: [0, 0, 0], to: [1, 0, 0], edges: 4}, measure: angle, material: {axial_stiffness: 100, flexural_stiffness: 0}}
+supports:
+  - {vertex: 0, type: pin}
+""")
+    fields = ",".join(["all", *derived])
+    subprocess.run([program, "-scene", tmp + "/cable.yaml", "-output_dir", tmp + "/cable", "-output_fields", fields], check=True, stdout=subprocess.DEVNULL)
+    _, f = read(tmp + "/cable/trajectory.h5")
+    assert "turns" not in f and not f["moment"].any() and f["force"][-1].any()
