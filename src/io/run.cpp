@@ -59,7 +59,10 @@ std::string groupsText(const Scene &scene) {
 
 Provenance provenance(int argc, char **argv) {
   Provenance p;
-  for (int i = 0; i < argc; ++i) p.command_line += (i ? " " : "") + std::string(argv[i]);
+  for (int i = 0; i < argc; ++i) {
+    if (i) p.command_line += ' ';
+    p.command_line += argv[i];
+  }
   char *all = nullptr;
   if (PetscOptionsGetAll(nullptr, &all) == 0 && all) p.options = all;
   (void)PetscFree(all);
