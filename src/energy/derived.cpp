@@ -100,7 +100,8 @@ RodActions rodActions(const Scene &scene, const Elements &elements, const State 
     const RodRange &rod = elements.rods[r];
     for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
       // The axial force of the state is more exact than that of the strain, but holds dissipation while the edge moves.
-      const bool damped = scene.rods[r].material.stiffness_damping_coefficient != 0 && state.velocity[elements.vertex0[i]] != state.velocity[elements.vertex1[i]];
+      const bool damped =
+          scene.rods[r].material.stiffness_damping_coefficient != 0 && state.velocity[elements.vertex0[i]] != state.velocity[elements.vertex1[i]];
       const double axial = damped ? elements.axial_stiffness[i] * axialStrain(frames[i].length, elements.inverse_rest_length[i]) : state.axial_force[i];
       out.force[i] = stretchGradient(frames[i], axial, elements.inverse_rest_length[i]);
     }

@@ -159,6 +159,7 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
 
   TrajectoryWriter trajectory(o.output_dir, run.scene, *run.elements, origin, o.fields, o.loop.dynamic);
   trajectory.writeFrame(run.state);
+  trajectory.flushWhenDue();
   double next_output = o.output_interval > 0 ? o.output_interval * (1 + std::floor(run.state.time / o.output_interval * (1 + 1e-12))) : 0;
   const std::string checkpoint = o.output_dir + "/checkpoint.h5";
   long steps = 0, iterations = 0, rejected = 0;
@@ -177,6 +178,7 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
       trajectory.writeFrame(state);
       while (o.output_interval > 0 && next_output <= state.time * (1 + 1e-12)) next_output += o.output_interval;
     }
+    trajectory.flushWhenDue();
     if (o.checkpoint_interval > 0 && state.step % o.checkpoint_interval == 0) {
       trajectory.flush(); // a restart goes on where the frames end
       writeCheckpoint(checkpoint, state, loop.control);
@@ -197,6 +199,7 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
     progress.say(line.str());
     trajectory.writeCritical(point.load_factor);
     trajectory.writeFrame(*point.state);
+    trajectory.flush();
     PetscFunctionReturn(0);
   };
   bool finished;

@@ -138,11 +138,12 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
 }
 
 TrajectoryWriter::~TrajectoryWriter() {
+  if (broken_) return;
   try {
     flush();
-  } catch (const SceneError &) { // told by the flush that ends a run
+    writeXdmf();
+  } catch (const SceneError &) { // a run that goes on to its end flushes before, and tells
   }
-  writeXdmf();
 }
 
 void TrajectoryWriter::writeHeader(const Scene &scene, const Elements &elements, const Provenance &p) {
@@ -213,13 +214,6 @@ void TrajectoryWriter::writeFrame(const State &state) {
   step_->append(&step);
   time_->append(&state.time);
   times_.push_back(state.time);
-  if (times_.size() >= 2 * described_ && Clock::now() - described_at_ > 4 * patience) { // now and then: a killed run keeps a usable one
-    flush();
-    writeXdmf();
-    described_ = times_.size();
-    described_at_ = Clock::now();
-  } else
-    flushWhenDue();
 }
 
 void TrajectoryWriter::writeDiagnostics(const Diagnostics &row) {
@@ -231,17 +225,15 @@ void TrajectoryWriter::writeDiagnostics(const Diagnostics &row) {
     csv_rows_.append(text, std::to_chars(text, text + sizeof text, values[k]).ptr); // as many digits as bring the number back
   }
   csv_rows_ += '\n';
-  flushWhenDue();
 }
 
-void TrajectoryWriter::writeCritical(double load_factor) {
-  critical_->append(&load_factor);
-  flush();
-}
+void TrajectoryWriter::writeCritical(double load_factor) { critical_->append(&load_factor); }
 
 /// The times of frames go last: frames are complete up to the length of /time, whenever the run is killed.
 void TrajectoryWriter::flush() {
+  broken_ = true; // until all went well: half of a frame must not be followed by another
   csv_ << csv_rows_ << std::flush;
+  if (!csv_) throw SceneError(folder_ + "/diagnostics.csv: cannot be written; is the disk full?");
   csv_rows_.clear();
   for (const auto &series : diagnostics_) series->flush();
   critical_->flush();
@@ -249,6 +241,7 @@ void TrajectoryWriter::flush() {
     if (series) series->flush();
   step_->flush();
   time_->flush();
+  broken_ = false;
   flushed_ = Clock::now();
 }
 
@@ -256,7 +249,13 @@ void TrajectoryWriter::flushWhenDue() {
   std::size_t waiting = csv_rows_.size();
   for (const auto &series : state_)
     if (series) waiting += series->waitingBytes();
-  if (waiting > most_waiting || Clock::now() - flushed_ > patience) flush();
+  const Clock::time_point now = Clock::now();
+  const bool describe = times_.size() >= 2 * described_ && now - described_at_ > 4 * patience; // now and then: a killed run keeps a usable XDMF file
+  if (describe || waiting > most_waiting || now - flushed_ > patience) flush();
+  if (!describe) return;
+  writeXdmf();
+  described_ = times_.size();
+  described_at_ = now;
 }
 
 /// One frame of a block, in which the mark '@' stands for its number and '#' for its time. `rods`: a polyline each, with the fields of vertices;

@@ -83,7 +83,8 @@ TEST(InternalMoment, BesideAClampInsideARodIsThatOfTheHigherSide) {
   const RodActions actions = actionsOf(sim);
   for (int i = 0; i < edges; ++i) EXPECT_LT((actions.force[i] - (i < 4 ? Vec3(-first) : last)).norm(), exact);
   for (int v = 0; v <= edges; ++v) {
-    const Vec3 expected = v < 4 ? Vec3((sim.state.position[v] - sim.state.position[0]).cross(first)) : Vec3((sim.state.position[edges] - sim.state.position[v]).cross(last));
+    const Vec3 expected =
+        v < 4 ? Vec3((sim.state.position[v] - sim.state.position[0]).cross(first)) : Vec3((sim.state.position[edges] - sim.state.position[v]).cross(last));
     EXPECT_LT((actions.moment[v] - expected).norm(), exact) << v;
   }
 }
@@ -194,7 +195,8 @@ TEST(InternalForce, AcceleratesTheVertices) {
   const std::vector<Vec3> before = sim.state.velocity;
   TimeLoop loop(sim.solver, dynamics(dt, 11 * dt));
   bool finished;
-  EXPECT_PETSC(loop.run(sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+  EXPECT_PETSC(loop.run(
+      sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
   EXPECT_PETSC(PetscOptionsClearValue(nullptr, "-snes_rtol"));
   ASSERT_TRUE(finished);
   const RodActions actions = actionsOf(sim);

@@ -31,8 +31,8 @@ struct Provenance {
   int ranks = 1;
 };
 
-/// Rows and frames wait in memory for at most half a second of wall time or 4 MB before they go to the files, in order: a killed run loses the
-/// last of them and nothing else.
+/// What is written waits in memory, or in HDF5, until it is flushed: flushWhenDue() after every step does so half a second after the last time, or
+/// when 4 MB wait. A killed run loses what was not flushed and nothing else.
 class TrajectoryWriter {
 public:
   /// \param fields which of fieldNames() and derivedFieldNames() to write; position always
@@ -47,6 +47,7 @@ public:
   void writeCritical(double load_factor);
   /// Makes all that was written safe from a kill, and visible to readers. \throws SceneError when it cannot be written
   void flush();
+  void flushWhenDue();
   int frames() const { return int(times_.size()); }
 
   /// Fields of a state.
@@ -70,11 +71,11 @@ private:
   std::vector<std::unique_ptr<Hdf5Series>> state_; ///< of all fields in their order; null where one is not written
   std::unique_ptr<Hdf5Series> time_, step_, critical_;
   std::vector<std::unique_ptr<Hdf5Series>> diagnostics_;
+  bool broken_ = false;                      ///< a flush failed
   Clock::time_point flushed_, described_at_; ///< long ago: the first frame goes to the files at once
   std::size_t described_ = 0;                ///< frames in the XDMF file
 
   void writeHeader(const Scene &scene, const Elements &elements, const Provenance &provenance);
-  void flushWhenDue();
   std::string xdmfFrame(bool edges) const;
   void writeXdmf() const;
 };
