@@ -7,6 +7,10 @@
 namespace tendril {
 namespace {
 
+constexpr std::size_t chunk_bytes = 1 << 16;  ///< at least a slab, about as much as this
+constexpr std::size_t direct_bytes = 1 << 18; ///< slabs from here on are not worth collecting
+constexpr const char *write_failed = "the trajectory cannot be written; is the disk full?";
+
 template <class Id> Id checked(Id id, const std::string &what) {
   if (id < 0) throw SceneError(what);
   return id;
@@ -95,25 +99,43 @@ void Hdf5File::writeAttribute(const std::string &name, int value) {
 Hdf5Series::Hdf5Series(const Hdf5File &file, const std::string &name, const std::vector<hsize_t> &slab, bool integer) : extent_(slab) {
   extent_.insert(extent_.begin(), 0);
   std::vector<hsize_t> most = extent_, chunk = extent_;
-  hsize_t bytes = 8;
-  for (const hsize_t n : slab) bytes *= n;
+  for (const hsize_t n : slab) slab_size_ *= n;
   most[0] = H5S_UNLIMITED;
-  chunk[0] = std::clamp<hsize_t>((1 << 16) / std::max<hsize_t>(bytes, 1), 1, 1024);
+  chunk[0] = std::clamp<hsize_t>(chunk_bytes / std::max<hsize_t>(slab_size_ * sizeof(double), 1), 1, 1024);
   const Hdf5Space space = H5Screate_simple(int(extent_.size()), extent_.data(), most.data());
   const Hdf5Properties create = H5Pcreate(H5P_DATASET_CREATE);
   H5Pset_chunk(create, int(chunk.size()), chunk.data());
+  H5Pset_fill_time(create, H5D_FILL_TIME_NEVER); // all of the extent is written; without this, large chunks pass through memory twice
+  const Hdf5Properties access = H5Pcreate(H5P_DATASET_ACCESS);
+  if (isLarge()) H5Pset_chunk_cache(access, 0, 0, 1); // no cache: to the file from where the values are
   const hid_t type = integer ? H5T_STD_I64LE : H5T_IEEE_F64LE;
-  dataset_ = checked(H5Dcreate2(file.id(), name.c_str(), type, space, H5P_DEFAULT, create, H5P_DEFAULT), "dataset " + name + " cannot be created");
+  dataset_ = checked(H5Dcreate2(file.id(), name.c_str(), type, space, H5P_DEFAULT, create, access), "dataset " + name + " cannot be created");
 }
 
+bool Hdf5Series::isLarge() const { return slab_size_ * sizeof(double) >= direct_bytes; }
+
 void Hdf5Series::append(const double *values) {
+  if (isLarge())
+    write(values, 1);
+  else
+    waiting_.insert(waiting_.end(), values, values + slab_size_);
+}
+
+void Hdf5Series::flush() {
+  if (!waiting_.empty()) write(waiting_.data(), waiting_.size() / slab_size_);
+  waiting_.clear();
+  checked(H5Dflush(dataset_), write_failed);
+}
+
+void Hdf5Series::write(const double *values, hsize_t slabs) {
   std::vector<hsize_t> start(extent_.size(), 0), count = extent_;
-  start[0] = extent_[0]++;
-  count[0] = 1;
-  checked(H5Dset_extent(dataset_, extent_.data()), "the trajectory cannot be extended; is the disk full?");
+  start[0] = extent_[0];
+  count[0] = slabs;
+  extent_[0] += slabs;
+  checked(H5Dset_extent(dataset_, extent_.data()), write_failed);
   const Hdf5Space file_space = H5Dget_space(dataset_), memory = H5Screate_simple(int(count.size()), count.data(), nullptr);
   H5Sselect_hyperslab(file_space, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
-  checked(H5Dwrite(dataset_, H5T_NATIVE_DOUBLE, memory, file_space, H5P_DEFAULT, values), "the trajectory cannot be written; is the disk full?");
+  checked(H5Dwrite(dataset_, H5T_NATIVE_DOUBLE, memory, file_space, H5P_DEFAULT, values), write_failed);
 }
 
 } // namespace tendril

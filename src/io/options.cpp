@@ -12,6 +12,15 @@
 namespace tendril {
 namespace {
 
+std::string joined(const std::vector<std::string> &words) {
+  std::string text;
+  for (const std::string &w : words) {
+    if (!text.empty()) text += ',';
+    text += w;
+  }
+  return text;
+}
+
 /// An option of ours. Where `fallback` begins with a bracket it is a description, not a value.
 struct Entry {
   std::string name, meaning, fallback;
@@ -34,7 +43,7 @@ const std::vector<Entry> &entries() {
         {"output_interval", "time between frames: the first step at or after each multiple is written; 0: every step [s]", "0"},
         {"checkpoint_interval", "steps between checkpoints; 0: only at the end", "0"},
         {"restart", "checkpoint of the same scene to go on from, to the same bits; the results go to another folder", "(none)"},
-        {"output_fields", "fields of a frame besides the position: director,velocity,twist_rate,axial_force,turns", "all"},
+        {"output_fields", "fields of a frame besides the position: all for " + joined(TrajectoryWriter::fieldNames()) + "; by name also " + joined(TrajectoryWriter::derivedFieldNames()), "all"},
         {"retraction", "how positions move: additive (straight), or length (keeping the linearised lengths of the edges)", "length"},
         {"stretch", "axial force: primal (from the strain), or mixed (an unknown of its own)", "mixed"},
         {"hessian", "exact, or gauss_newton (without second derivatives of the strains; for comparison)", "exact"},
@@ -117,17 +126,16 @@ private:
 };
 
 std::set<std::string> readFields(const Texts &texts) {
-  const auto &names = TrajectoryWriter::fieldNames();
-  if (!texts.has("output_fields") || texts.at("output_fields") == "all") return {names.begin(), names.end()};
+  const auto &names = TrajectoryWriter::fieldNames(), &derived = TrajectoryWriter::derivedFieldNames();
   std::set<std::string> fields;
-  std::istringstream in(texts.at("output_fields"));
+  std::istringstream in(texts.has("output_fields") ? texts.at("output_fields") : "all");
   for (std::string word; std::getline(in, word, ',');) {
-    if (std::find(names.begin(), names.end(), word) == names.end()) {
-      std::string all;
-      for (const std::string &n : names) all += (all.empty() ? "" : ",") + n;
-      fail("output_fields", "there is no field '" + word + "'; choose from " + all);
-    }
-    fields.insert(word);
+    if (word == "all")
+      fields.insert(names.begin(), names.end());
+    else if (std::find(names.begin(), names.end(), word) != names.end() || std::find(derived.begin(), derived.end(), word) != derived.end())
+      fields.insert(word);
+    else
+      fail("output_fields", "there is no field '" + word + "'; choose from all," + joined(names) + "," + joined(derived));
   }
   return fields;
 }

@@ -24,16 +24,20 @@ void Progress::say(const std::string &line) {
 
 void Progress::step(const Diagnostics &row) {
   const double done = row.time / end_;
+  const bool report = done >= next_report_ || row.rejected_steps > 0;
+  const bool rewrite = terminal_ && (report || row.wall_seconds >= next_line_);
+  if (!report && !rewrite) return;
   const double left = done > 0 ? row.wall_seconds * (1 - done) / done : 0;
   char line[200];
   std::snprintf(line, sizeof line, "time %.6g of %.6g  dt %.3g  its %d  energy %.6e J  %.0f s left", row.time, end_, row.dt, row.newton_iterations,
                 row.energy.total(), left);
-  if (terminal_) {
+  if (rewrite) {
+    next_line_ = row.wall_seconds + 0.1;
     std::printf("\r%-90s", line);
     std::fflush(stdout);
     open_line_ = true;
   }
-  if (done < next_report_ && row.rejected_steps == 0) return;
+  if (!report) return;
   std::fprintf(log_, "%s\n", line);
   std::fflush(log_);
   if (!terminal_) {

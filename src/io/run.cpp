@@ -59,7 +59,10 @@ std::string groupsText(const Scene &scene) {
 
 Provenance provenance(int argc, char **argv) {
   Provenance p;
-  for (int i = 0; i < argc; ++i) p.command_line += (i ? " " : "") + std::string(argv[i]);
+  for (int i = 0; i < argc; ++i) {
+    if (i) p.command_line += ' ';
+    p.command_line += argv[i];
+  }
   char *all = nullptr;
   if (PetscOptionsGetAll(nullptr, &all) == 0 && all) p.options = all;
   (void)PetscFree(all);
@@ -154,12 +157,9 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
   std::istringstream groups(groupsText(run.scene));
   for (std::string line; std::getline(groups, line);) progress.say(line);
 
-  TrajectoryWriter trajectory(o.output_dir, run.scene, *run.elements, origin, o.fields);
-  std::ofstream csv(o.output_dir + "/diagnostics.csv");
-  csv << std::setprecision(17);
-  for (std::size_t k = 0; k < Diagnostics::names().size(); ++k) csv << (k ? "," : "") << Diagnostics::names()[k];
-  csv << std::endl;
+  TrajectoryWriter trajectory(o.output_dir, run.scene, *run.elements, origin, o.fields, o.loop.dynamic);
   trajectory.writeFrame(run.state);
+  trajectory.flushWhenDue();
   double next_output = o.output_interval > 0 ? o.output_interval * (1 + std::floor(run.state.time / o.output_interval * (1 + 1e-12))) : 0;
   const std::string checkpoint = o.output_dir + "/checkpoint.h5";
   long steps = 0, iterations = 0, rejected = 0;
@@ -174,14 +174,15 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
     rejected += row.rejected_steps;
     wall = row.wall_seconds;
     trajectory.writeDiagnostics(row);
-    const std::vector<double> values = row.values();
-    for (std::size_t k = 0; k < values.size(); ++k) csv << (k ? "," : "") << values[k];
-    csv << '\n' << std::flush;
     if (arclength || state.time >= next_output * (1 - 1e-12) || state.time >= o.loop.t_end) {
       trajectory.writeFrame(state);
       while (o.output_interval > 0 && next_output <= state.time * (1 + 1e-12)) next_output += o.output_interval;
     }
-    if (o.checkpoint_interval > 0 && state.step % o.checkpoint_interval == 0) writeCheckpoint(checkpoint, state, loop.control);
+    trajectory.flushWhenDue();
+    if (o.checkpoint_interval > 0 && state.step % o.checkpoint_interval == 0) {
+      trajectory.flush(); // a restart goes on where the frames end
+      writeCheckpoint(checkpoint, state, loop.control);
+    }
     progress.step(row);
     if (!o.loop.dynamic && row.negative_pivots > 0 && !warned) {
       progress.say("warning: " + std::to_string(row.negative_pivots) + " negative pivots at an accepted state with couples: couples have no potential, so its stability is not known");
@@ -198,6 +199,7 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
     progress.say(line.str());
     trajectory.writeCritical(point.load_factor);
     trajectory.writeFrame(*point.state);
+    trajectory.flush();
     PetscFunctionReturn(0);
   };
   bool finished;
@@ -212,7 +214,10 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
     PetscCall(loop.run(run.state, observe, &finished));
     failure = loop.failure();
   }
+  PetscCall(PetscLogEventBegin(events().output, 0, 0, 0, 0));
+  trajectory.flush();
   if (!arclength) writeCheckpoint(checkpoint, run.state, loop.control);
+  PetscCall(PetscLogEventEnd(events().output, 0, 0, 0, 0));
   PetscCall(PetscLogStagePop());
   std::ostringstream summary;
   summary << steps << " steps, " << iterations << " Newton iterations (mean " << std::setprecision(3) << (steps ? double(iterations) / double(steps) : 0) << "), " << rejected

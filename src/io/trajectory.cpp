@@ -1,29 +1,58 @@
 #include "tendril/io/trajectory.hpp"
 
+#include "tendril/energy/derived.hpp"
+
 #include <algorithm>
+#include <charconv>
 #include <filesystem>
 #include <fstream>
-#include <iomanip>
+#include <sstream>
 
 namespace tendril {
 namespace {
 
 enum class On { vertices, edges, cells };
+
+/// A frame about to be written: a state and what is derived from it, as far as some field needs it.
+struct Snapshot {
+  const State &state;
+  RodStrains strains;
+  RodActions actions;
+};
+enum class From { state, strains, actions };
+
 struct Field {
   const char *name;
   On place;
   hsize_t components;
-  const double *(*data)(const State &);
+  From source;
+  const double *(*data)(const Snapshot &);
 };
 
 const Field fields[] = {
-    {"position", On::vertices, 3, [](const State &s) { return s.position[0].data(); }},
-    {"director", On::edges, 3, [](const State &s) { return s.director[0].data(); }},
-    {"velocity", On::vertices, 3, [](const State &s) { return s.velocity[0].data(); }},
-    {"twist_rate", On::edges, 1, [](const State &s) { return s.twist_rate.data(); }},
-    {"axial_force", On::edges, 1, [](const State &s) { return s.axial_force.data(); }},
-    {"turns", On::cells, 1, [](const State &s) { return s.turns.data(); }}, // measure `angle`: 2 pi x whole turns of each cell's twist [rad]
+    {"position", On::vertices, 3, From::state, [](const Snapshot &s) { return s.state.position[0].data(); }},
+    {"director", On::edges, 3, From::state, [](const Snapshot &s) { return s.state.director[0].data(); }},
+    {"velocity", On::vertices, 3, From::state, [](const Snapshot &s) { return s.state.velocity[0].data(); }},
+    {"twist_rate", On::edges, 1, From::state, [](const Snapshot &s) { return s.state.twist_rate.data(); }},
+    {"axial_force", On::edges, 1, From::state, [](const Snapshot &s) { return s.state.axial_force.data(); }},
+    // Measure `angle`: 2 pi x whole turns of each cell's twist [rad].
+    {"turns", On::cells, 1, From::state, [](const Snapshot &s) { return s.state.turns.data(); }},
+    {"curvature", On::vertices, 2, From::strains, [](const Snapshot &s) { return s.strains.curvature[0].data(); }},
+    {"twist", On::vertices, 1, From::strains, [](const Snapshot &s) { return s.strains.twist.data(); }},
+    {"strain_energy_density", On::vertices, 1, From::strains, [](const Snapshot &s) { return s.strains.strain_energy_density.data(); }},
+    {"force", On::edges, 3, From::actions, [](const Snapshot &s) { return s.actions.force[0].data(); }},
+    {"moment", On::vertices, 3, From::actions, [](const Snapshot &s) { return s.actions.moment[0].data(); }},
 };
+
+std::vector<std::string> namesOf(bool derived) {
+  std::vector<std::string> names;
+  for (const Field &f : fields)
+    if ((f.source != From::state) == derived) names.push_back(f.name);
+  return names;
+}
+
+constexpr auto patience = std::chrono::milliseconds(500); ///< how long rows and frames may wait
+constexpr std::size_t most_waiting = 4 << 20;             ///< [bytes]
 
 std::array<int, 3> sizes(const Elements &e) { return {e.vertices(), e.edges(), int(e.cell_slot.size())}; }
 
@@ -36,11 +65,12 @@ template <class Get> std::vector<double> perRod(const Scene &scene, Get get) {
 } // namespace
 
 const std::vector<std::string> &TrajectoryWriter::fieldNames() {
-  static const std::vector<std::string> names = [] {
-    std::vector<std::string> n;
-    for (const Field &f : fields) n.push_back(f.name);
-    return n;
-  }();
+  static const std::vector<std::string> names = namesOf(false);
+  return names;
+}
+
+const std::vector<std::string> &TrajectoryWriter::derivedFieldNames() {
+  static const std::vector<std::string> names = namesOf(true);
   return names;
 }
 
@@ -78,17 +108,24 @@ std::vector<double> Diagnostics::values() const {
 }
 
 TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene, const Elements &elements, const Provenance &provenance,
-                                   const std::set<std::string> &wanted)
-    : folder_(folder), rods_(elements.rods.size()), vertices_(elements.vertices()), edges_(elements.edges()),
-      file_(Hdf5File::create(folder + "/trajectory.h5")) {
+                                   const std::set<std::string> &wanted, bool dynamic)
+    : scene_(scene), elements_(elements), dynamic_(dynamic), folder_(folder), rods_(elements.rods.size()), vertices_(elements.vertices()),
+      edges_(elements.edges()), csv_(folder + "/diagnostics.csv"), file_(Hdf5File::create(folder + "/trajectory.h5")) {
+  for (const std::string &name : Diagnostics::names()) {
+    if (!csv_rows_.empty()) csv_rows_ += ',';
+    csv_rows_ += name;
+  }
+  csv_rows_ += '\n';
   writeHeader(scene, elements, provenance);
   file_.createGroup("state");
   for (const Field &f : fields) {
+    state_.push_back(nullptr);
     if (std::string(f.name) != "position" && !wanted.count(f.name)) continue;
     if (f.place == On::cells && std::find(elements.measure.begin(), elements.measure.end(), Measure::angle) == elements.measure.end()) continue;
     std::vector<hsize_t> slab{hsize_t(sizes(elements)[std::size_t(f.place)])};
+    if (slab[0] == 0) continue; // cables have no cells
     if (f.components > 1) slab.push_back(f.components);
-    state_.emplace_back(f.name, std::make_unique<Hdf5Series>(file_, std::string("state/") + f.name, slab));
+    state_.back() = std::make_unique<Hdf5Series>(file_, std::string("state/") + f.name, slab);
   }
   file_.createGroup("diagnostics");
   for (const std::string &name : Diagnostics::names())
@@ -100,7 +137,14 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
   file_.startAppending();
 }
 
-TrajectoryWriter::~TrajectoryWriter() { writeXdmf(); }
+TrajectoryWriter::~TrajectoryWriter() {
+  if (broken_) return;
+  try {
+    flush();
+    writeXdmf();
+  } catch (const SceneError &) { // a run that goes on to its end flushes before, and tells
+  }
+}
 
 void TrajectoryWriter::writeHeader(const Scene &scene, const Elements &elements, const Provenance &p) {
   file_.writeAttribute("format", std::string("tendril-trajectory"));
@@ -155,87 +199,143 @@ void TrajectoryWriter::writeHeader(const Scene &scene, const Elements &elements,
   file_.write("material/flexural_stiffness", {nr, 2}, flexural.data());
 }
 
-/// The time of a frame is written last: frames are complete up to the length of /time, whenever the run is killed.
 void TrajectoryWriter::writeFrame(const State &state) {
-  for (const Field &f : fields)
-    for (auto &[name, series] : state_)
-      if (name == f.name) {
-        series->append(f.data(state));
-        series->flush();
-      }
+  Snapshot snapshot{state, {}, {}};
+  auto wanted = [&](From source) {
+    for (std::size_t k = 0; k < state_.size(); ++k)
+      if (state_[k] && fields[k].source == source) return true;
+    return false;
+  };
+  if (wanted(From::strains)) snapshot.strains = rodStrains(scene_, elements_, state, state.time);
+  if (wanted(From::actions)) snapshot.actions = rodActions(scene_, elements_, state, state.time, dynamic_ ? 1 : state.time);
+  for (std::size_t k = 0; k < state_.size(); ++k)
+    if (state_[k]) state_[k]->append(fields[k].data(snapshot));
   const double step = double(state.step);
   step_->append(&step);
-  step_->flush();
   time_->append(&state.time);
-  time_->flush();
   times_.push_back(state.time);
-  if ((times_.size() & (times_.size() - 1)) == 0) writeXdmf(); // now and then: a killed run keeps a usable one
 }
 
 void TrajectoryWriter::writeDiagnostics(const Diagnostics &row) {
   const std::vector<double> values = row.values();
+  char text[32];
   for (std::size_t k = 0; k < values.size(); ++k) {
     diagnostics_[k]->append(&values[k]);
-    diagnostics_[k]->flush();
+    if (k) csv_rows_ += ',';
+    csv_rows_.append(text, std::to_chars(text, text + sizeof text, values[k]).ptr); // as many digits as bring the number back
   }
+  csv_rows_ += '\n';
 }
 
-void TrajectoryWriter::writeCritical(double load_factor) {
-  critical_->append(&load_factor);
+void TrajectoryWriter::writeCritical(double load_factor) { critical_->append(&load_factor); }
+
+/// The times of frames go last: frames are complete up to the length of /time, whenever the run is killed.
+void TrajectoryWriter::flush() {
+  broken_ = true; // until all went well: half of a frame must not be followed by another
+  csv_ << csv_rows_ << std::flush;
+  if (!csv_) throw SceneError(folder_ + "/diagnostics.csv: cannot be written; is the disk full?");
+  csv_rows_.clear();
+  for (const auto &series : diagnostics_) series->flush();
   critical_->flush();
+  for (const auto &series : state_)
+    if (series) series->flush();
+  step_->flush();
+  time_->flush();
+  broken_ = false;
+  flushed_ = Clock::now();
 }
 
-/// The frames as slabs of the HDF5 datasets, in the form of ParaView's "XDMF Reader". Two blocks over the same points:
-/// `rods`, a polyline each, with the fields of vertices; `edges`, a segment each, with those of edges as cell data as well.
+void TrajectoryWriter::flushWhenDue() {
+  std::size_t waiting = csv_rows_.size();
+  for (const auto &series : state_)
+    if (series) waiting += series->waitingBytes();
+  const Clock::time_point now = Clock::now();
+  const bool describe = times_.size() >= 2 * described_ && now - described_at_ > 4 * patience; // now and then: a killed run keeps a usable XDMF file
+  if (describe || waiting > most_waiting || now - flushed_ > patience) flush();
+  if (!describe) return;
+  writeXdmf();
+  described_ = times_.size();
+  described_at_ = now;
+}
+
+/// One frame of a block, in which the mark '@' stands for its number and '#' for its time. `rods`: a polyline each, with the fields of vertices;
+/// `edges`: a segment each, with those of edges as cell data as well.
+std::string TrajectoryWriter::xdmfFrame(bool edges) const {
+  std::ostringstream out;
+  auto dataset = [&](const std::string &name, const std::string &shape, const char *type, int bytes) {
+    out << "<DataItem Dimensions=\"" << shape << "\" NumberType=\"" << type << "\" Precision=\"" << bytes << "\" Format=\"HDF\">trajectory.h5:/" << name
+        << "</DataItem>\n";
+  };
+  // One frame out of a dataset (nt, n[, c]), or one of its components. ParaView takes the first text in here as the geometry's name: it keeps
+  // what it read under that name, and complains when there is none.
+  auto frameOf = [&](const Field &f, int component = -1) {
+    const std::string n = std::to_string(f.place == On::vertices ? vertices_ : edges_);
+    std::string shape = n;
+    if (f.components > 1) shape.append(" ").append(std::to_string(f.components));
+    const std::string part = component < 0 ? shape : n + " 1";
+    out << "     <DataItem ItemType=\"HyperSlab\" Dimensions=\"" << (component < 0 ? shape : n) << "\"><!-- frame @ --><DataItem Dimensions=\"3 "
+        << (f.components > 1 ? 3 : 2) << "\" Format=\"XML\">@ 0 ";
+    if (f.components > 1) out << std::max(component, 0) << " 1 ";
+    out << "1 1 1 " << part << "</DataItem>";
+    dataset(std::string("state/") + f.name, std::to_string(times_.size()) + " " + shape, "Float", 8);
+    out << "     </DataItem>\n";
+  };
+  auto attribute = [&](const Field &f, int component = -1) {
+    out << "    <Attribute Name=\"" << f.name;
+    if (component >= 0) out << "_" << component + 1;
+    out << "\" AttributeType=\"" << (f.components == 3 ? "Vector" : "Scalar") << "\" Center=\"" << (f.place == On::vertices ? "Node" : "Cell") << "\">\n";
+    frameOf(f, component);
+    out << "    </Attribute>\n";
+  };
+  out << "   <Grid GridType=\"Uniform\">\n    <Time Value=\"#\"/>\n    <Topology TopologyType=";
+  if (edges) {
+    out << "\"Polyline\" NodesPerElement=\"2\" NumberOfElements=\"" << edges_ << "\">";
+    dataset("topology/edges", std::to_string(edges_) + " 2", "Int", 4);
+  } else {
+    out << "\"Mixed\" NumberOfElements=\"" << rods_ << "\">";
+    dataset("topology/polylines", std::to_string(polyline_entries_), "Int", 4);
+  }
+  out << "    </Topology>\n    <Geometry GeometryType=\"XYZ\">\n";
+  frameOf(fields[0]);
+  out << "    </Geometry>\n";
+  for (std::size_t k = 1; k < state_.size(); ++k) {
+    const Field &f = fields[k];
+    if (!state_[k] || f.place == On::cells || (f.place == On::edges && !edges)) continue;
+    if (f.components != 2)
+      attribute(f);
+    else
+      for (const int component : {0, 1}) attribute(f, component); // ParaView knows scalars and vectors of three
+  }
+  out << "   </Grid>\n";
+  return out.str();
+}
+
+/// The frames as slabs of the HDF5 datasets, in the form of ParaView's "XDMF Reader".
 void TrajectoryWriter::writeXdmf() const {
   const std::string path = folder_ + "/trajectory.xdmf";
-  {
-    std::ofstream out(path + ".part");
-    out << std::setprecision(17);
-    const std::size_t nt = times_.size();
-    auto dataset = [&](const std::string &name, const std::string &shape, const char *type, int bytes) {
-      out << "<DataItem Dimensions=\"" << shape << "\" NumberType=\"" << type << "\" Precision=\"" << bytes << "\" Format=\"HDF\">trajectory.h5:/" << name
-          << "</DataItem>\n";
-    };
-    // One frame out of a dataset (nt, n[, 3]). ParaView takes the first text in here as the geometry's name: it keeps what it read under that
-    // name, and complains when there is none.
-    auto frameOf = [&](const Field &f, std::size_t frame) {
-      const std::string shape = std::to_string(f.place == On::vertices ? vertices_ : edges_) + (f.components > 1 ? " " + std::to_string(f.components) : "");
-      out << "     <DataItem ItemType=\"HyperSlab\" Dimensions=\"" << shape << "\"><!-- frame " << frame << " --><DataItem Dimensions=\"3 "
-          << (f.components > 1 ? 3 : 2) << "\" Format=\"XML\">" << frame << (f.components > 1 ? " 0 0 1 1 1 1 " : " 0 1 1 1 ") << shape << "</DataItem>";
-      dataset(std::string("state/") + f.name, std::to_string(nt) + " " + shape, "Float", 8);
-      out << "     </DataItem>\n";
-    };
-    out << "<?xml version=\"1.0\"?>\n<!-- In ParaView choose \"XDMF Reader\"; its Xdmf3 readers do not know HyperSlab. -->\n<Xdmf Version=\"3.0\">\n "
-           "<Domain>\n";
-    for (const bool edges : {false, true}) {
-      out << "  <Grid Name=\"" << (edges ? "edges" : "rods") << "\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
-      for (std::size_t frame = 0; frame < nt; ++frame) {
-        out << "   <Grid GridType=\"Uniform\">\n    <Time Value=\"" << times_[frame] << "\"/>\n    <Topology TopologyType=";
-        if (edges) {
-          out << "\"Polyline\" NodesPerElement=\"2\" NumberOfElements=\"" << edges_ << "\">";
-          dataset("topology/edges", std::to_string(edges_) + " 2", "Int", 4);
-        } else {
-          out << "\"Mixed\" NumberOfElements=\"" << rods_ << "\">";
-          dataset("topology/polylines", std::to_string(polyline_entries_), "Int", 4);
-        }
-        out << "    </Topology>\n    <Geometry GeometryType=\"XYZ\">\n";
-        frameOf(fields[0], frame);
-        out << "    </Geometry>\n";
-        for (const Field &f : fields) {
-          const bool written = std::any_of(state_.begin(), state_.end(), [&](const auto &s) { return s.first == f.name; });
-          if (&f == &fields[0] || !written || f.place == On::cells || (f.place == On::edges && !edges)) continue;
-          out << "    <Attribute Name=\"" << f.name << "\" AttributeType=\"" << (f.components > 1 ? "Vector" : "Scalar") << "\" Center=\""
-              << (f.place == On::vertices ? "Node" : "Cell") << "\">\n";
-          frameOf(f, frame);
-          out << "    </Attribute>\n";
-        }
-        out << "   </Grid>\n";
+  std::ofstream out(path + ".part");
+  out << "<?xml version=\"1.0\"?>\n<!-- In ParaView choose \"XDMF Reader\"; its Xdmf3 readers do not know HyperSlab. -->\n<Xdmf Version=\"3.0\">\n <Domain>\n";
+  for (const bool edges : {false, true}) {
+    out << "  <Grid Name=\"" << (edges ? "edges" : "rods") << "\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
+    const std::string pattern = xdmfFrame(edges);
+    std::string text;
+    for (std::size_t frame = 0; frame < times_.size(); ++frame) {
+      char time[32];
+      std::snprintf(time, sizeof time, "%.17g", times_[frame]);
+      const std::string number = std::to_string(frame);
+      text.clear();
+      for (std::size_t at = 0; at < pattern.size();) {
+        const std::size_t mark = std::min(pattern.find_first_of("@#", at), pattern.size());
+        text.append(pattern, at, mark - at);
+        if (mark < pattern.size()) text += pattern[mark] == '@' ? number.c_str() : time;
+        at = mark + 1;
       }
-      out << "  </Grid>\n";
+      out << text;
     }
-    out << " </Domain>\n</Xdmf>\n";
+    out << "  </Grid>\n";
   }
+  out << " </Domain>\n</Xdmf>\n";
+  out.close();
   std::error_code ignored;
   std::filesystem::rename(path + ".part", path, ignored);
 }

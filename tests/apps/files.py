@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""What a run leaves behind: files.py <tendril> <source folder>. A killed run is readable to its last frame; the XDMF file leads to every frame."""
+"""What a run leaves behind: files.py <tendril> <source folder>. A run can be read while it goes on; a killed one
+is readable to its last half second; the XDMF file leads to every frame."""
 import os
 import signal
 import subprocess
@@ -59,17 +60,45 @@ with tempfile.TemporaryDirectory() as tmp:
 
     assert restarted > 0, "no run lived long enough to write a checkpoint"
 
-    short = tmp + "/short"
-    subprocess.run(run(short, "-dt", "0.01", "-t_end", "0.1"), check=True, stdout=subprocess.DEVNULL)
+    # Without checkpoints nothing but the clock sends frames to the file.
+    live = tmp + "/live"
+    process = subprocess.Popen(run(live, "-dt", "1e-3", "-t_end", "1000"), stdout=subprocess.DEVNULL)
+    while not os.path.exists(live + "/trajectory.h5") or os.path.getsize(live + "/diagnostics.csv") == 0:
+        time.sleep(0.005)
+    time.sleep(1)
+    with h5py.File(live + "/trajectory.h5", "r", swmr=True) as f:
+        lengths = []
+        for _ in range(2):
+            f["time"].refresh()
+            f["state/position"].refresh()
+            lengths.append(len(f["time"]))
+            assert np.isfinite(f["state/position"][lengths[-1] - 1]).all() and f["time"][lengths[-1] - 1] == max(f["time"][: lengths[-1]])
+            time.sleep(1.2)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    t, _ = read(live + "/trajectory.h5")
+    rows = open(live + "/diagnostics.csv").read().splitlines()
+    wall = float(rows[len(t) - 1].split(",")[-1])  # of the last frame
+    assert 1 < lengths[0] < lengths[1] <= len(t), (lengths, len(t))
+    assert all(r.count(",") == rows[0].count(",") for r in rows) and len(rows) >= len(t), (len(rows), len(t))
+    assert wall > 2.2 - 0.5 - 0.5, wall  # killed after 2.2 s: the last half second may be lost, and a busy machine may be late by as much
+    print("read live with", lengths, "frames; killed after 2.2 s with all up to", wall, "s")
+
+    short, derived = tmp + "/short", ["curvature", "twist", "strain_energy_density", "force", "moment"]
+    subprocess.run(run(short, "-dt", "0.01", "-t_end", "0.1", "-output_fields", ",".join(["all", *derived])), check=True, stdout=subprocess.DEVNULL)
     # Every reference of the XDMF file, resolved by hand: scripts/check_xdmf needs ParaView, which not every machine has.
     t, f = read(short + "/trajectory.h5")
+    assert set(derived) <= f.keys() and not set(derived) & fields.keys(), "derived fields are written when asked for, and only then"
+    f["curvature_1"], f["curvature_2"] = np.moveaxis(f.pop("curvature"), -1, 0)
+    of_edges = {"director", "twist_rate", "axial_force", "force"}
     for block in ElementTree.parse(short + "/trajectory.xdmf").findall("Domain/Grid"):
         grids = block.findall("Grid")
         assert [float(g.find("Time").get("Value")) for g in grids] == list(t), "times differ"
         for k, grid in enumerate(grids):
             items = {"position": grid.find("Geometry/DataItem")}
             items.update((a.get("Name"), a.find("DataItem")) for a in grid.findall("Attribute"))
-            assert items.keys() == (f.keys() if block.get("Name") == "edges" else {"position", "velocity"}), items.keys()
+            assert items.keys() == (f.keys() if block.get("Name") == "edges" else f.keys() - of_edges), items.keys()
+            assert {a.get("Name") for a in grid.findall("Attribute") if a.get("Center") == "Cell"} == items.keys() & of_edges
             for field, item in items.items():
                 selection, data = item.findall("DataItem")
                 start, stride, count = np.array(selection.text.split(), int).reshape(3, -1)
@@ -80,3 +109,16 @@ with tempfile.TemporaryDirectory() as tmp:
                     slab = h5[path][tuple(slice(s, s + n) for s, n in zip(start, count))]
                 assert np.array_equal(slab.reshape(f[field][k].shape), f[field][k]), f"{field} of frame {k}"
     print("XDMF leads to", len(t), "frames")
+
+    # Cables have no cells, and so no whole turns to write.
+    with open(tmp + "/cable.yaml", "w") as f:
+        f.write("""simulation: {dt: 0.01, t_end: 0.02}
+rods:
+  - {line: {from: [0, 0, 0], to: [1, 0, 0], edges: 4}, measure: angle, material: {axial_stiffness: 100, flexural_stiffness: 0}}
+supports:
+  - {vertex: 0, type: pin}
+""")
+    fields = ",".join(["all", *derived])
+    subprocess.run([program, "-scene", tmp + "/cable.yaml", "-output_dir", tmp + "/cable", "-output_fields", fields], check=True, stdout=subprocess.DEVNULL)
+    _, f = read(tmp + "/cable/trajectory.h5")
+    assert "turns" not in f and not f["moment"].any() and f["force"][-1].any()

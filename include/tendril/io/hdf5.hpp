@@ -60,16 +60,23 @@ private:
   std::string path_;
 };
 
-/// A dataset that grows by one slab per append: shape (n, slab...).
+/// A dataset that grows by one slab per append: shape (n, slab...). Small slabs wait in memory until flush() and are then written at once; large
+/// ones go to the file directly. Readers see both after flush().
 class Hdf5Series {
 public:
   Hdf5Series(const Hdf5File &file, const std::string &name, const std::vector<hsize_t> &slab, bool integer = false);
   void append(const double *values);
-  void flush() const { H5Dflush(dataset_); }
+  void flush();
+  std::size_t waitingBytes() const { return waiting_.size() * sizeof(double); }
 
 private:
   Hdf5Dataset dataset_;
   std::vector<hsize_t> extent_;
+  std::size_t slab_size_ = 1; ///< values in a slab
+  std::vector<double> waiting_;
+
+  bool isLarge() const;
+  void write(const double *values, hsize_t slabs);
 };
 
 } // namespace tendril

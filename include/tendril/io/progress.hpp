@@ -20,6 +20,7 @@ private:
   double end_;
   bool terminal_, open_line_ = false;
   double next_report_ = 0; ///< fraction of the run at which the next line is due when there is no terminal
+  double next_line_ = 0;   ///< wall time of the run at which the line on a terminal is due again [s]
   std::FILE *log_;
 };
 

@@ -5,6 +5,8 @@
 #include "tendril/energy/term.hpp"
 #include "tendril/io/hdf5.hpp"
 
+#include <chrono>
+#include <fstream>
 #include <map>
 #include <memory>
 #include <set>
@@ -29,31 +31,52 @@ struct Provenance {
   int ranks = 1;
 };
 
+/// What is written waits in memory, or in HDF5, until it is flushed: flushWhenDue() after every step does so half a second after the last time, or
+/// when 4 MB wait. A killed run loses what was not flushed and nothing else.
 class TrajectoryWriter {
 public:
-  /// \param fields which of position, director, velocity, twist_rate, axial_force to write; position always
-  TrajectoryWriter(const std::string &folder, const Scene &scene, const Elements &elements, const Provenance &provenance, const std::set<std::string> &fields);
+  /// \param fields which of fieldNames() and derivedFieldNames() to write; position always
+  /// \param dynamic statics: the time of a state is also the load factor
+  TrajectoryWriter(const std::string &folder, const Scene &scene, const Elements &elements, const Provenance &provenance, const std::set<std::string> &fields,
+                   bool dynamic);
   ~TrajectoryWriter();
   void writeFrame(const State &state);
+  /// Also to diagnostics.csv.
   void writeDiagnostics(const Diagnostics &row);
   /// Adds to /critical/load_factor.
   void writeCritical(double load_factor);
+  /// Makes all that was written safe from a kill, and visible to readers. \throws SceneError when it cannot be written
+  void flush();
+  void flushWhenDue();
   int frames() const { return int(times_.size()); }
 
+  /// Fields of a state.
   static const std::vector<std::string> &fieldNames();
+  /// Fields computed from it, only when asked for.
+  static const std::vector<std::string> &derivedFieldNames();
 
 private:
+  using Clock = std::chrono::steady_clock;
+  const Scene &scene_;
+  const Elements &elements_;
+  bool dynamic_;
   std::string folder_;
   std::size_t rods_;
   int vertices_, edges_;
   hsize_t polyline_entries_ = 0;
   std::vector<double> times_;
+  std::string csv_rows_; ///< not yet in diagnostics.csv
+  std::ofstream csv_;
   Hdf5File file_;
-  std::vector<std::pair<std::string, std::unique_ptr<Hdf5Series>>> state_;
+  std::vector<std::unique_ptr<Hdf5Series>> state_; ///< of all fields in their order; null where one is not written
   std::unique_ptr<Hdf5Series> time_, step_, critical_;
   std::vector<std::unique_ptr<Hdf5Series>> diagnostics_;
+  bool broken_ = false;                      ///< a flush failed
+  Clock::time_point flushed_, described_at_; ///< long ago: the first frame goes to the files at once
+  std::size_t described_ = 0;                ///< frames in the XDMF file
 
   void writeHeader(const Scene &scene, const Elements &elements, const Provenance &provenance);
+  std::string xdmfFrame(bool edges) const;
   void writeXdmf() const;
 };
 

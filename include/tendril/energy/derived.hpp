@@ -1,0 +1,29 @@
+#pragma once
+/// \file derived.hpp
+/// Strains and internal forces and moments of a state, for output: nothing here takes part in a step. docs/theory.md derives the balances.
+
+#include "tendril/dynamics/state.hpp"
+
+namespace tendril {
+
+/// Strains at the vertices, as the energy measures them: per reference length, the natural ones not taken off. Zero where nothing bends or twists
+/// (free and pinned ends, cables).
+struct RodStrains {
+  std::vector<Eigen::Vector2d> curvature;    ///< (nv) about the first and second director, mean of the adjacent edges' [1/m]
+  std::vector<double> twist;                 ///< (nv) [rad/m]
+  std::vector<double> strain_energy_density; ///< (nv) of a vertex' cells and half of its edges, over half their reference lengths [J/m]
+};
+/// Prescribed motions are at `motion_time`.
+RodStrains rodStrains(const Scene &scene, const Elements &elements, const State &state, double motion_time);
+
+/// What the part of a rod towards higher numbers does to the part towards lower ones, in the world frame; elastic, without dissipation.
+struct RodActions {
+  std::vector<Vec3> force;  ///< (ne) [N]; tension points along the tangent
+  std::vector<Vec3> moment; ///< (nv) about the vertex [N m]; zero at free and pinned ends; beside a support inside a rod, on the side of higher numbers
+};
+/// With forces F and couples C, at an equilibrium and whatever the edge length: force(i) = force(i+1) + F(i+1) and
+/// moment(i) = moment(i+1) + e(i) x force(i) + C(i).
+/// \param load_factor on the couples of the scene
+RodActions rodActions(const Scene &scene, const Elements &elements, const State &state, double motion_time, double load_factor);
+
+} // namespace tendril
