@@ -50,30 +50,58 @@ private:
     return energy + reduce(energies);
   }
 
-  template <Measure measure> [[gnu::flatten]] void assemble(const Configuration &configuration, int rod, HessianKind hessian, Derivatives &out) const {
+  /// Where the derivatives of a cell go: the planes of its unknowns, from its first slot on.
+  template <class T> struct Adder {
+    const std::array<double *, slot_size> &gradient;
+    const std::array<double *, slot_entries> &entry;
+    int first;
+    void putGradient(int r, const T &v) const { addTo(gradient[r % slot_size] + first + r / slot_size, v); }
+    void putHessian(int r, int c, const T &v) const { addTo(entry[r % slot_size * band_width + c - r] + first + r / slot_size, v); }
+  };
+  /// The Hessian alone.
+  template <class T> struct HessianAdder : Adder<T> {
+    void putGradient(int, const T &) const {}
+  };
+
+  template <Measure measure> void assemble(const Configuration &configuration, int rod, HessianKind hessian, Derivatives &out) const {
     const RodRange &range = elements_.rods[rod];
+    std::array<double *, slot_size> gradient;
     std::array<double *, slot_entries> entry;
+    for (int a = 0; a < slot_size; ++a) gradient[a] = out.equilibrium[a];
     for (int e = 0; e < slot_entries; ++e) entry[e] = out.band.entry(range, e / band_width, e % band_width) - range.first_slot;
+    if (hessian == HessianKind::none)
+      addGradients<measure>(configuration, rod, gradient);
+    else if (hessian == HessianKind::gauss_newton) {
+      addGradients<measure>(configuration, rod, gradient);
+      addGaussNewton<measure>(configuration, rod, gradient, entry);
+    } else
+      addAll<measure>(configuration, rod, gradient, entry);
+  }
+
+  template <Measure measure> [[gnu::flatten, gnu::noinline]] void addGradients(const Configuration &c, int rod, const std::array<double *, slot_size> &gradient) const {
     forCells(elements_, rod, [&]<class T>(const LooseCell &cell, int count) {
-      const auto [f0, f1] = cellFrames<T>(configuration, cell, count);
-      CellOf<T> constants = cellOf<T>(cells_, configuration, cell.slot);
-      const int first = cell.vertex - 1;
-      CellDerivatives<T> d;
-      if (hessian == HessianKind::none) {
-        d.gradient = cellGradient<measure>(f0, f1, constants);
-        for (int r = 0; r < cell_size; ++r) addTo(out.equilibrium[r % slot_size] + first + r / slot_size, d.gradient[r]);
-        return;
-      }
-      cellDerivatives<measure>(f0, f1, constants, d);
-      if (hessian == HessianKind::gauss_newton) { // the Hessian the cell would have if it were at rest as it is
-        const std::array<T, cell_size> gradient = d.gradient;
-        constants.rest = cellStrain<measure>(f0, f1, constants);
-        cellDerivatives<measure>(f0, f1, constants, d);
-        d.gradient = gradient;
-      }
-      for (int r = 0; r < cell_size; ++r) addTo(out.equilibrium[r % slot_size] + first + r / slot_size, d.gradient[r]);
-      for (int r = 0, k = 0; r < cell_size; ++r)
-        for (int c = 0; c < cell_size - r; ++c, ++k) addTo(entry[r % slot_size * band_width + c] + first + r / slot_size, d.hessian[k]);
+      const auto f = cellFrames<T>(c, cell, count);
+      const std::array<T, cell_size> g = cellGradient<measure>(f[0], f[1], cellOf<T>(cells_, c, cell.slot));
+      for (int r = 0; r < cell_size; ++r) addTo(gradient[r % slot_size] + cell.vertex - 1 + r / slot_size, g[r]);
+    });
+  }
+
+  template <Measure measure>
+  [[gnu::flatten, gnu::noinline]] void addAll(const Configuration &c, int rod, const std::array<double *, slot_size> &gradient, const std::array<double *, slot_entries> &entry) const {
+    forCells(elements_, rod, [&]<class T>(const LooseCell &cell, int count) {
+      const auto f = cellFrames<T>(c, cell, count);
+      cellDerivatives<measure>(f[0], f[1], cellOf<T>(cells_, c, cell.slot), Adder<T>{gradient, entry, cell.vertex - 1});
+    });
+  }
+
+  /// The Hessian that cells would have if they were at rest as they are.
+  template <Measure measure>
+  [[gnu::flatten, gnu::noinline]] void addGaussNewton(const Configuration &c, int rod, const std::array<double *, slot_size> &gradient, const std::array<double *, slot_entries> &entry) const {
+    forCells(elements_, rod, [&]<class T>(const LooseCell &cell, int count) {
+      const auto f = cellFrames<T>(c, cell, count);
+      CellOf<T> constants = cellOf<T>(cells_, c, cell.slot);
+      constants.rest = cellStrain<measure>(f[0], f[1], constants);
+      cellDerivatives<measure>(f[0], f[1], constants, HessianAdder<T>{{gradient, entry, cell.vertex - 1}});
     });
   }
 };

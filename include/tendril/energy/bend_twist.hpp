@@ -31,6 +31,9 @@ template <class T> struct CellOf {
 template <class T> struct CellDerivatives {
   std::array<T, cell_size> gradient;
   std::array<T, cell_pairs> hessian; ///< upper triangle, row by row
+
+  void putGradient(int r, const T &v) { gradient[r] = v; }
+  void putHessian(int r, int c, const T &v) { hessian[r * cell_size - r * (r - 1) / 2 + (c - r)] = v; }
 };
 
 /// phi(z) = atan(sqrt z)/sqrt z and two derivatives, z = tan^2 of half the turning angle: the factor between the two measures of bending.
@@ -141,9 +144,9 @@ template <Measure measure, class T> std::array<T, cell_size> cellGradient(const 
   return {-e0[0], -e0[1], -e0[2], theta0, e0[0] - e1[0], e0[1] - e1[1], e0[2] - e1[2], theta1, e1[0], e1[1], e1[2]};
 }
 
-/// Gradient and Hessian of a cell's energy, pulled back by the retraction at the current frames: exact and symmetric.
-template <Measure measure, class T>
-void cellDerivatives(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell, CellDerivatives<T> &out) {
+/// Gradient and Hessian of a cell's energy, pulled back by the retraction at the current frames: exact and symmetric. Each number goes to `out` once,
+/// by putGradient(r, value) or, for r <= c, putHessian(r, c, value).
+template <Measure measure, class T, class Out> void cellDerivatives(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell, Out &&out) {
   const CellGeometry<T> g = cellGeometry(f0, f1, cell);
   const Vector3<T> &t0 = f0.tangent, &t1 = f1.tangent, &b = g.binormal;
   const T i0 = cell.free[0] / f0.length, i1 = cell.free[1] / f1.length;
@@ -217,7 +220,9 @@ void cellDerivatives(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T>
   const Vector8 up = dp_g - psi_g * bp;
   const Vector8 ut = twist_g * f_twist2;
   T h[8][8]; // upper triangle
+#pragma GCC unroll 8
   for (int r = 0; r < 8; ++r)
+#pragma GCC unroll 8
     for (int c = r; c < 8; ++c)
       h[r][c] = kappa_g[0][r] * u0[c] + kappa_g[1][r] * u1[c] + stretch_g[r] * us[c] + twist_g[r] * ut[c] + psi_g[r] * up[c] + dp_g[r] * psi_g[c];
 
@@ -229,12 +234,15 @@ void cellDerivatives(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T>
   const Vector3<T> q0 = p * (T(0.5) * i0 * i0) - (t0 + mean) * (T(0.25) * i0 * i0 * twist_weight);
   const Vector3<T> q1 = (t1 + mean) * (T(-0.25) * i1 * i1 * twist_weight);
   const Vector3<T> v0 = m1 * (i0 * i0), v1 = m0 * (i1 * i1);
+#pragma GCC unroll 3
   for (int r = 0; r < 3; ++r)
+#pragma GCC unroll 3
     for (int c = r; c < 3; ++c) {
       // 2 bp mean mean' - m1 mean' - mean m1', and the like for the second edge; symmetric sums.
       h[r][c] = h[r][c] + w0[r] * mean[c] - mean[r] * v0[c] - t0[r] * t0[c] * s0 + b[r] * q0[c] + q0[r] * b[c];
       h[4 + r][4 + c] = h[4 + r][4 + c] + w1[r] * mean[c] + mean[r] * v1[c] - t1[r] * t1[c] * s1 + b[r] * q1[c] + q1[r] * b[c];
     }
+#pragma GCC unroll 3
   for (int r = 0; r < 3; ++r) {
     h[r][r] = h[r][r] + s0;
     h[4 + r][4 + r] = h[4 + r][4 + r] + s1;
@@ -243,7 +251,9 @@ void cellDerivatives(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T>
   const Vector3<T> x0 = (two_mean - m1) * i01, x1 = m0 * i01;
   const Vector3<T> cross = t0 * (twist_weight / g.chi) - m2;
   const Matrix3<T> skew = crossMatrix<T>(cross);
+#pragma GCC unroll 3
   for (int r = 0; r < 3; ++r)
+#pragma GCC unroll 3
     for (int c = 0; c < 3; ++c) {
       T v = x0[r] * mean[c] + mean[r] * x1[c] - t0[r] * t1[c] * (shift * i01) + skew(r, c) * i01 - b[r] * mean[c] * (T(0.5) * twist_weight * i01);
       if (r == c) v = v - shift * i01;
@@ -252,17 +262,19 @@ void cellDerivatives(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T>
 
   // From edge vectors to vertices: e0 = x1 - x0, e1 = x2 - x1.
   auto at = [&](int r, int c) { return r <= c ? h[r][c] : h[c][r]; };
-  auto put = [&](int r, int c, const T &v) { out.hessian[r * cell_size - r * (r - 1) / 2 + (c - r)] = v; };
+  auto put = [&](int r, int c, const T &v) { out.putHessian(r, c, v); };
+#pragma GCC unroll 3
   for (int r = 0; r < 3; ++r) {
-    out.gradient[r] = -gradient[r];
-    out.gradient[4 + r] = gradient[r] - gradient[4 + r];
-    out.gradient[8 + r] = gradient[4 + r];
+    out.putGradient(r, -gradient[r]);
+    out.putGradient(4 + r, gradient[r] - gradient[4 + r]);
+    out.putGradient(8 + r, gradient[4 + r]);
     put(r, 3, -h[r][3]);
     put(r, 7, -h[r][7]);
     put(3, 4 + r, at(3, r) - at(3, 4 + r));
     put(3, 8 + r, at(3, 4 + r));
     put(4 + r, 7, at(r, 7) - at(4 + r, 7));
     put(7, 8 + r, at(7, 4 + r));
+#pragma GCC unroll 3
     for (int c = 0; c < 3; ++c) {
       const T a00 = at(r, c), a01 = h[r][4 + c], a10 = h[c][4 + r], a11 = at(4 + r, 4 + c);
       if (c >= r) put(r, c, a00);
@@ -273,8 +285,8 @@ void cellDerivatives(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T>
       if (c >= r) put(8 + r, 8 + c, a11);
     }
   }
-  out.gradient[3] = gradient[3];
-  out.gradient[7] = gradient[7];
+  out.putGradient(3, gradient[3]);
+  out.putGradient(7, gradient[7]);
   put(3, 3, h[3][3]);
   put(3, 7, h[3][7]);
   put(7, 7, h[7][7]);
