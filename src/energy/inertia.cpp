@@ -49,25 +49,28 @@ public:
     for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
       const Pack difference = spinOver(*start_, c, s).total - read<Pack>(predicted_[3] + s);
       const auto d = twistInertia<Pack>(start_->frames<Pack>(s), c.frames<Pack>(s), Pack(weight_[r]) * read<Pack>(elements_.twistMass() + s), difference);
+      // What belongs to the first vertex of the edges before what belongs to the second, whose memory overlaps (see cellDerivatives).
       addTo(out.equilibrium[3] + s, d.gradient[3]);
-      for (int a = 0; a < 3; ++a) {
-        addTo<Pack>(out.equilibrium[a] + s, -d.gradient[a]);
-        addTo(out.equilibrium[a] + s + 1, d.gradient[a]);
-      }
-      if (hessian == HessianKind::none) continue;
-      addTo(entry[3 * band_width] + s, d.hessian[9]);
-      int k = 0;
-      for (int a = 0; a < 3; ++a) {
-        for (int b = a; b < 3; ++b, ++k) {
-          addTo(entry[a * band_width + b - a] + s, d.hessian[k]);
-          addTo(entry[a * band_width + b - a] + s + 1, d.hessian[k]);
-          addTo<Pack>(entry[a * band_width + slot_size + b - a] + s, -d.hessian[k]);
-          if (b != a) addTo<Pack>(entry[b * band_width + slot_size + a - b] + s, -d.hessian[k]);
+      for (int a = 0; a < 3; ++a) addTo<Pack>(out.equilibrium[a] + s, -d.gradient[a]);
+      if (hessian != HessianKind::none) {
+        auto couple = [&](int a, int k, const Pack &v) { addTo(entry[a * band_width + k] + s, v); };
+        couple(3, 0, d.hessian[9]);
+        int k = 0;
+        for (int a = 0; a < 3; ++a) {
+          for (int b = a; b < 3; ++b, ++k) {
+            couple(a, b - a, d.hessian[k]);
+            couple(a, slot_size + b - a, -d.hessian[k]);
+            if (b != a) couple(b, slot_size + a - b, -d.hessian[k]);
+          }
+          couple(a, 3 - a, -d.hessian[k]);
+          couple(3, 1 + a, d.hessian[k]);
+          ++k;
         }
-        addTo<Pack>(entry[a * band_width + 3 - a] + s, -d.hessian[k]);
-        addTo(entry[3 * band_width + 1 + a] + s, d.hessian[k]);
-        ++k;
+        k = 0;
+        for (int a = 0; a < 3; ++a, ++k)
+          for (int b = a; b < 3; ++b, ++k) addTo(entry[a * band_width + b - a] + s + 1, d.hessian[k]);
       }
+      for (int a = 0; a < 3; ++a) addTo(out.equilibrium[a] + s + 1, d.gradient[a]);
     }
   }
 

@@ -33,20 +33,27 @@ public:
       const Pack force = select(live, mixed_ ? read<Pack>(configuration[Configuration::axial_force] + i) : primal, Pack(0.0));
       const FrameOf<Pack> f = configuration.frames<Pack>(i);
       const Vector3<Pack> e = stretchGradient(f, force, inverse), g = stretchGradient<Pack>(f, select(live, primal - force, Pack(0.0)), inverse);
+      // What belongs to the first vertex of the edges before what belongs to the second, whose memory overlaps (see cellDerivatives).
       for (int a = 0; a < 3; ++a) {
         addTo<Pack>(out.equilibrium[a] + i, -e[a]);
-        addTo(out.equilibrium[a] + i + 1, e[a]);
         addTo<Pack>(out.gradient[a] + i, -g[a]);
-        addTo(out.gradient[a] + i + 1, g[a]);
       }
-      if (hessian == HessianKind::none) continue;
+      if (hessian == HessianKind::none) {
+        for (int a = 0; a < 3; ++a) {
+          addTo(out.equilibrium[a] + i + 1, e[a]);
+          addTo(out.gradient[a] + i + 1, g[a]);
+        }
+        continue;
+      }
       const Matrix3<Pack> h = stretchHessian<Pack>(f, stiffness, hessian == HessianKind::exact ? force : max(force, Pack(0.0)), inverse);
       for (int a = 0; a < 3; ++a) {
-        for (int b = a; b < 3; ++b) {
-          addTo(entry[a][b - a] + i, h(a, b));
-          addTo(entry[a][b - a] + i + 1, h(a, b));
-        }
+        for (int b = a; b < 3; ++b) addTo(entry[a][b - a] + i, h(a, b));
         for (int b = 0; b < 3; ++b) addTo<Pack>(entry[a][slot_size + b - a] + i, -h(a, b));
+      }
+      for (int a = 0; a < 3; ++a) {
+        addTo(out.equilibrium[a] + i + 1, e[a]);
+        addTo(out.gradient[a] + i + 1, g[a]);
+        for (int b = a; b < 3; ++b) addTo(entry[a][b - a] + i + 1, h(a, b));
       }
     }
   }

@@ -260,36 +260,46 @@ template <Measure measure, class T, class Out> void cellDerivatives(const FrameO
       h[r][4 + c] = h[r][4 + c] + v;
     }
 
-  // From edge vectors to vertices: e0 = x1 - x0, e1 = x2 - x1.
-  auto at = [&](int r, int c) { return r <= c ? h[r][c] : h[c][r]; };
+  // From edge vectors to vertices, e0 = x1 - x0, e1 = x2 - x1: first what belongs to the rows of x0 and theta0, then x1 and theta1, then x2. Neighbouring
+  // cells meet in the same memory a slot apart; in this order a store has left the pipeline before a load needs a part of it.
+  auto at = [&](int r, int c) -> const T & { return r <= c ? h[r][c] : h[c][r]; };
   auto put = [&](int r, int c, const T &v) { out.putHessian(r, c, v); };
 #pragma GCC unroll 3
   for (int r = 0; r < 3; ++r) {
     out.putGradient(r, -gradient[r]);
-    out.putGradient(4 + r, gradient[r] - gradient[4 + r]);
-    out.putGradient(8 + r, gradient[4 + r]);
+#pragma GCC unroll 3
+    for (int c = r; c < 3; ++c) put(r, c, h[r][c]);
     put(r, 3, -h[r][3]);
-    put(r, 7, -h[r][7]);
-    put(3, 4 + r, at(3, r) - at(3, 4 + r));
-    put(3, 8 + r, at(3, 4 + r));
-    put(4 + r, 7, at(r, 7) - at(4 + r, 7));
-    put(7, 8 + r, at(7, 4 + r));
 #pragma GCC unroll 3
     for (int c = 0; c < 3; ++c) {
-      const T a00 = at(r, c), a01 = h[r][4 + c], a10 = h[c][4 + r], a11 = at(4 + r, 4 + c);
-      if (c >= r) put(r, c, a00);
-      put(r, 4 + c, a01 - a00);
-      put(r, 8 + c, -a01);
-      if (c >= r) put(4 + r, 4 + c, a00 - a01 - a10 + a11);
-      put(4 + r, 8 + c, a01 - a11);
-      if (c >= r) put(8 + r, 8 + c, a11);
+      put(r, 4 + c, h[r][4 + c] - at(r, c));
+      put(r, 8 + c, -h[r][4 + c]);
     }
+    put(r, 7, -h[r][7]);
+    put(3, 4 + r, at(3, r) - h[3][4 + r]);
+    put(3, 8 + r, h[3][4 + r]);
   }
   out.putGradient(3, gradient[3]);
-  out.putGradient(7, gradient[7]);
   put(3, 3, h[3][3]);
   put(3, 7, h[3][7]);
+#pragma GCC unroll 3
+  for (int r = 0; r < 3; ++r) {
+    out.putGradient(4 + r, gradient[r] - gradient[4 + r]);
+#pragma GCC unroll 3
+    for (int c = r; c < 3; ++c) put(4 + r, 4 + c, h[r][c] - h[r][4 + c] - h[c][4 + r] + h[4 + r][4 + c]);
+    put(4 + r, 7, h[r][7] - h[4 + r][7]);
+#pragma GCC unroll 3
+    for (int c = 0; c < 3; ++c) put(4 + r, 8 + c, h[r][4 + c] - at(4 + r, 4 + c));
+    put(7, 8 + r, h[4 + r][7]);
+  }
+  out.putGradient(7, gradient[7]);
   put(7, 7, h[7][7]);
+#pragma GCC unroll 3
+  for (int r = 0; r < 3; ++r) {
+    out.putGradient(8 + r, gradient[4 + r]);
+#pragma GCC unroll 3
+    for (int c = r; c < 3; ++c) put(8 + r, 8 + c, h[4 + r][4 + c]);
+  }
 }
 
 } // namespace tendril
