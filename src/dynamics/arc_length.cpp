@@ -17,7 +17,7 @@ void requireDeadLoads(const Scene &scene) {
 }
 
 ArcLength::ArcLength(StepSolver &solver, const LoopSettings &settings)
-    : solver_(solver), settings_(settings), metric_(solver.potential().dofs().makePlanes()), load_derivatives_(solver.potential().dofs()) {
+    : solver_(solver), settings_(settings), metric_(solver.potential().dofs().makePlanes()), load_derivatives_(solver.potential().dofs().slots()) {
   const IncrementalPotential &potential = solver.potential();
   const Elements &e = potential.elements();
   load_ = makeLoad(potential.scene(), e);

@@ -31,7 +31,7 @@ using C = Configuration;
 
 IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, const Elements &elements, bool dynamic)
     : scene_(scene), dofs_(dofs), elements_(elements), retraction_(elements, dofs), axial_(scene, elements), terms_(makeTerms(scene, elements, axial_, dynamic)),
-      start_(elements.slots), derivatives_(dofs), known_(elements.rods.size(), Known::nothing) {
+      start_(elements.slots), known_(elements.rods.size(), Known::nothing) {
   for (std::size_t r = 0; r < elements.rods.size(); ++r) {
     const RodRange &rod = elements.rods[r];
     double sum = 0, shortest = HUGE_VAL, bending = 0, cell = HUGE_VAL;
@@ -228,6 +228,17 @@ void IncrementalPotential::assembleRod(int r, HessianKind hessian) {
   dofs_.fold(rod, d.equilibrium);
   if (hessian != HessianKind::none) dofs_.fold(rod, d.band);
   known_[r] = hessian == HessianKind::none ? Known::gradient : Known::all;
+}
+
+void IncrementalPotential::focus(RodSet rods) {
+  if (rods.begin == focus_.begin && rods.end == focus_.end) return;
+  std::fill(known_.begin() + focus_.begin, known_.begin() + focus_.end, Known::nothing);
+  focus_ = rods;
+  if (dofs_.slots(rods) > room_) {
+    room_ = dofs_.slots(rods);
+    derivatives_ = Derivatives(room_);
+  }
+  derivatives_.setOrigin(elements_.rods[rods.begin].first_slot);
 }
 
 const Derivatives &IncrementalPotential::derivatives(RodSet rods) {

@@ -149,7 +149,7 @@ PetscErrorCode DofMap::createMatrix(Mat *matrix) {
           if (u < 0 || v < 0) continue;
           row.push_back(u);
           column.push_back(v);
-          source_.push_back(Band::offset(rod, a, k) + i);
+          source_.push_back(Band().offset(rod, a, k) + i);
         }
   const std::size_t upper = source_.size();
   for (std::size_t n = 0; n < upper; ++n)
@@ -239,8 +239,6 @@ PetscErrorCode DofMap::scatter(Vec in, RodSet rods, Planes &values) const {
   PetscCall(VecRestoreArrayRead(in, &from));
   PetscFunctionReturn(0);
 }
-
-Band::Band(const DofMap &dofs) : data_(std::size_t(slot_entries) * dofs.slots() + 2 * lanes, 0.0) {}
 
 void Band::clear(const RodRange &rod) { std::fill_n(entry(rod, 0, 0) - 1, std::size_t(slot_entries) * rod.slots, 0.0); }
 

@@ -60,10 +60,16 @@ double dot(const RodRange &rod, const Planes &a, const Planes &b) {
 
 } // namespace
 
-NewtonWork::NewtonWork(const IncrementalPotential &potential)
+NewtonWork::NewtonWork(const IncrementalPotential &potential, int slots)
     : wanted(potential.all().end, true), shift(wanted.size(), 0), last_shift(shift), negative(wanted.size(), 0), energy(wanted.size()), energy_known(wanted.size(), false),
-      residual(wanted.size()), moving(wanted.size(), false), increment(potential.dofs().makePlanes()), coordinates(increment), motion(increment),
-      metric(shiftMetric(potential.elements(), potential.dofs())), trial(potential.elements().slots) {}
+      residual(wanted.size()), moving(wanted.size(), false), increment(slot_size, slots), coordinates(increment), trial(slots), motion(potential.dofs().makePlanes()),
+      metric(shiftMetric(potential.elements(), potential.dofs())) {}
+
+void NewtonWork::setOrigin(int first_slot) {
+  increment.setOrigin(first_slot);
+  coordinates.setOrigin(first_slot);
+  trial.setOrigin(first_slot);
+}
 
 bool isSmall(const IncrementalPotential::Residual &r, double rtol) {
   return r.force <= std::max(rtol, r.force_floor) && r.moment <= std::max(rtol, r.moment_floor) &&
@@ -408,12 +414,18 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
 PetscErrorCode NewtonSolver::inertiaAtIterate(int *negative) {
   bool regular;
   PetscFunctionBeginUser;
+  focus();
   fill(work_->wanted, true);
   PetscCall(assemble(jacobian_));
   PetscCall(refactor());
   PetscCall(readInertia(&regular));
   *negative = regular ? report_.negative_pivots : -1;
   PetscFunctionReturn(0);
+}
+
+void NewtonSolver::focus() {
+  potential_->focus(rods_);
+  work_->setOrigin(potential_->elements().rods[rods_.begin].first_slot);
 }
 
 /// SNES from the potential's iterate. `failure` is null when it converged.
@@ -492,6 +504,7 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
   const char *failure = nullptr;
   const bool is_static = potential_->step().isStatic();
   PetscFunctionBeginUser;
+  focus();
   report_ = {};
   seek_ = seek;
   sharpness_ = 1;

@@ -79,11 +79,14 @@ PetscErrorCode NewtonSolver::findBucklingMode(bool *found) {
   const DofMap &dofs = potential_->dofs();
   const Elements &e = potential_->elements();
   Band softening = potential_->derivatives(rods_).band;
-  auto dot = [](const Planes &a, const Planes &b) {
+  auto weighted = [&](const Planes &a, const Planes &b, const Planes *weight) {
     double sum = 0;
-    for (std::size_t k = 0; k < a.size(); ++k) sum += a.data()[k] * b.data()[k];
+    for (int r = rods_.begin; r < rods_.end; ++r)
+      for (int k = 0; k < slot_size; ++k)
+        for (int s = e.rods[r].first_slot; s < e.rods[r].vertexEnd(); ++s) sum += (weight ? (*weight)[k][s] : 1.0) * a[k][s] * b[k][s];
     return sum;
   };
+  auto dot = [&](const Planes &a, const Planes &b) { return weighted(a, b, nullptr); };
   // A fixed start without symmetry: the same on every machine, orthogonal to no mode of interest.
   work_->increment.clear();
   for (int r = rods_.begin; r < rods_.end; ++r) {
@@ -119,9 +122,8 @@ PetscErrorCode NewtonSolver::findBucklingMode(bool *found) {
     return y;
   };
   auto normalise = [&] {
-    double norm = 0;
-    for (std::size_t k = 0; k < work_->metric.size(); ++k) norm += work_->metric.data()[k] * work_->increment.data()[k] * work_->increment.data()[k];
-    for (double &d : work_->increment) d /= std::sqrt(norm);
+    const double norm = std::sqrt(weighted(work_->increment, work_->increment, &work_->metric));
+    for (double &d : work_->increment) d /= norm;
   };
   *found = false;
   normalise();

@@ -25,13 +25,19 @@ std::vector<RodSet> blocksOf(const std::vector<RodRange> &rods) {
 PetscErrorCode StepSolver::setUp(IncrementalPotential &potential, Coupling coupling) {
   PetscFunctionBeginUser;
   potential_ = &potential;
-  work_.emplace(potential);
+  const Elements &e = potential.elements();
+  const RodSet all = potential.all();
+  work_.emplace(potential, e.slots);
   blocks_.clear();
-  PetscCall(blocks_.emplace_back().setUp(potential, *work_, potential.all()));
-  if (coupling == Coupling::load || !front().isBanded()) PetscFunctionReturn(0);
-  const std::vector<RodSet> blocks = blocksOf(potential.elements().rods);
-  if (blocks.size() == 1) PetscFunctionReturn(0);
+  PetscCall(blocks_.emplace_back().setUp(potential, *work_, all));
+  const std::vector<RodSet> blocks = blocksOf(e.rods);
+  // Loose cells are not beside their rod.
+  const bool loose = std::any_of(e.loose.begin(), e.loose.end(), [](const auto &cells) { return !cells.empty(); });
+  if (coupling == Coupling::load || !front().isBanded() || loose || blocks.size() == 1) PetscFunctionReturn(0);
+  int slots = 0;
+  for (const RodSet &block : blocks) slots = std::max(slots, potential.dofs().slots(block));
   blocks_.clear();
+  work_.emplace(potential, slots);
   for (const RodSet &block : blocks) PetscCall(blocks_.emplace_back().setUp(potential, *work_, block));
   PetscFunctionReturn(0);
 }

@@ -35,7 +35,7 @@ void addRods(Scene &scene, const std::vector<int> &rods) {
 /// Fills the band with what cells could put there: the 11 unknowns of three neighbouring vertices meet.
 void fill(Problem &p, double diagonal) {
   Random random(3);
-  p.band = Band(p.dofs);
+  p.band = Band(p.dofs.slots());
   p.metric = p.dofs.makePlanes();
   const int n = int(p.dofs.unknowns());
   p.dense = Eigen::MatrixXd::Zero(n, n);

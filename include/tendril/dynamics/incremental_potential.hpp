@@ -42,11 +42,17 @@ public:
   RodEnergy rodEnergy(const Configuration &configuration, int rod) const;
   double energy(const Configuration &configuration, RodSet rods) const;
   double energy(const Configuration &configuration) const { return energy(configuration, all()); }
+  /// Room for the derivatives of some rods; those of others are forgotten. Whoever asks for derivatives has to have asked for room.
+  void focus(RodSet rods);
   /// Gradient, equilibrium residual and Hessian band at the iterates of some rods, computed once per iterate.
   const Derivatives &derivatives(RodSet rods);
   /// The same without the Hessian where it is not known yet.
   const Derivatives &gradient(int rod);
-  const Derivatives &derivatives() { return derivatives(all()); }
+  /// Of all rods, with room for them.
+  const Derivatives &derivatives() {
+    focus(all());
+    return derivatives(all());
+  }
   /// Derivatives of one rod with another Hessian than the step's; they stay until the rod moves.
   void assembleRod(int rod, HessianKind hessian);
   const Band &band() const { return derivatives_.band; }
@@ -99,7 +105,9 @@ private:
   };
   std::vector<Turned> turned_; ///< supports' frames that turn in this step
   Configuration start_, iterate_;
-  Derivatives derivatives_;
+  Derivatives derivatives_{0};
+  RodSet focus_{0, 0};
+  int room_ = 0; ///< slots
   enum class Known : char { nothing, gradient, all };
   std::vector<Known> known_; ///< per rod: what derivatives_ holds of the iterate
   std::vector<double> load_, force_scale_, length_, shortest_; ///< per rod: loads [N], or 0; the present scale of forces [N]; lengths [m]

@@ -62,6 +62,8 @@ public:
   void copyRod(const Elements &elements, int rod, const Configuration &from);
   /// Copies what a rod has beside its own edges: the frames of supports.
   void copyEnds(const Elements &elements, int rod, const Configuration &from);
+  /// Moves the window (see Planes).
+  void setOrigin(int first_slot) { values_.setOrigin(first_slot); }
   bool empty() const { return values_.size() == 0; }
   /// Frames of the first edge of a ring, and positions of its first two vertices, behind its last.
   void closeRing(const RodRange &rod);

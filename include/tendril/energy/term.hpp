@@ -28,7 +28,12 @@ struct Step {
 struct Derivatives {
   Planes gradient, equilibrium;
   Band band;
-  explicit Derivatives(const DofMap &dofs) : gradient(dofs.makePlanes()), equilibrium(dofs.makePlanes()), band(dofs) {}
+  explicit Derivatives(int slots) : gradient(slot_size, slots), equilibrium(slot_size, slots), band(slots) {}
+  void setOrigin(int first_slot) {
+    gradient.setOrigin(first_slot);
+    equilibrium.setOrigin(first_slot);
+    band.setOrigin(first_slot);
+  }
 };
 
 class Term {

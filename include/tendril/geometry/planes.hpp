@@ -11,14 +11,18 @@ namespace tendril {
 using AlignedVector = std::vector<double, Eigen::aligned_allocator<double>>;
 
 /// Several arrays over the same slots. Loops run over whole packs: a pack may begin one slot before the first and end a pack beyond the last.
+/// Work arrays hold a window of the slots, which moves along the scene and stays in the cache.
 class Planes {
 public:
   Planes() = default;
   /// All zero.
   Planes(int planes, int slots) : stride_(planeStride(slots)), data_(std::size_t(planes) * stride_ + 2 * lanes, 0.0) {}
 
-  double *operator[](int plane) { return data_.data() + lanes + std::size_t(plane) * stride_; }
-  const double *operator[](int plane) const { return data_.data() + lanes + std::size_t(plane) * stride_; }
+  double *operator[](int plane) { return data_.data() + (lanes + std::ptrdiff_t(plane) * stride_ - origin_); }
+  const double *operator[](int plane) const { return data_.data() + (lanes + std::ptrdiff_t(plane) * stride_ - origin_); }
+  /// Moves the window; it keeps what numbers it has.
+  void setOrigin(int first_slot) { origin_ = first_slot; }
+  int origin() const { return origin_; }
   Vec3 vector(int plane, int slot) const { return {(*this)[plane][slot], (*this)[plane + 1][slot], (*this)[plane + 2][slot]}; }
   void setVector(int plane, int slot, const Vec3 &v) {
     for (int a = 0; a < 3; ++a) (*this)[plane + a][slot] = v[a];
@@ -38,7 +42,7 @@ public:
   static int planeStride(int slots) { return (((slots + lanes - 1) / lanes) | 1) * lanes; }
 
 private:
-  int stride_ = 0;
+  int stride_ = 0, origin_ = 0;
   AlignedVector data_;
 };
 

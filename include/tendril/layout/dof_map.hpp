@@ -41,14 +41,15 @@ inline constexpr int band_width = cell_size;
 /// Entries of the band in the rows of one slot.
 inline constexpr int slot_entries = slot_size * band_width;
 
-class DofMap;
-
 /// Upper band of symmetric matrices of all rods: entry (a, k) of slot s couples unknown a of the slot with the k-th after it. Each of the
 /// 44 entries is a plane over the slots of a rod.
 class Band {
 public:
   Band() = default;
-  explicit Band(const DofMap &dofs);
+  /// Of all rods, or of as many neighbours as so many slots hold.
+  explicit Band(int slots) : data_(std::size_t(slot_entries) * slots + 4 * lanes, 0.0) {}
+  /// Moves the window to the rods from this slot on (see Planes).
+  void setOrigin(int first_slot) { origin_ = first_slot; }
   double *entry(const RodRange &rod, int a, int k) { return data_.data() + offset(rod, a, k); }
   const double *entry(const RodRange &rod, int a, int k) const { return data_.data() + offset(rod, a, k); }
   const double *data() const { return data_.data(); }
@@ -59,11 +60,12 @@ public:
   void multiply(const RodRange &rod, const Planes &x, Planes &y) const;
 
   /// Where the plane of an entry begins in data().
-  static std::size_t offset(const RodRange &rod, int a, int k) {
-    return std::size_t(slot_entries) * rod.first_slot + std::size_t(a * band_width + k) * rod.slots;
+  std::size_t offset(const RodRange &rod, int a, int k) const {
+    return lanes + std::size_t(slot_entries) * (rod.first_slot - origin_) + std::size_t(a * band_width + k) * rod.slots;
   }
 
 private:
+  int origin_ = 0;
   AlignedVector data_;
 };
 
@@ -97,6 +99,8 @@ public:
   PetscInt firstUnknown(RodSet rods) const { return unknown_begin_[rods.begin]; }
   PetscInt unknowns(RodSet rods) const { return unknown_begin_[rods.end] - unknown_begin_[rods.begin]; }
   RodSet all() const { return {0, int(rods_.size())}; }
+  /// Slots from the first rod's first to the one behind the last rod's room.
+  int slots(RodSet rods) const { return rods_[rods.end - 1].first_slot + rods_[rods.end - 1].slots - rods_[rods.begin].first_slot; }
 
   /// out = values of the unknowns of some rods; of these, rods not `wanted` (by scene order) get zero.
   PetscErrorCode gather(const Planes &values, RodSet rods, Vec out, const std::vector<char> *wanted = nullptr) const;

@@ -35,7 +35,10 @@ enum class Seek { minimum, equilibrium };
 
 /// What a solve keeps of rods and slots, for all solvers of a scene: each works on its own rods only.
 struct NewtonWork {
-  explicit NewtonWork(const IncrementalPotential &potential);
+  /// Room for blocks of up to so many slots.
+  NewtonWork(const IncrementalPotential &potential, int slots);
+  /// Moves the work arrays to the rods from this slot on.
+  void setOrigin(int first_slot);
   std::vector<char> wanted;  ///< rods that have not converged yet
   std::vector<double> shift, last_shift; ///< of the diagonal of indefinite Hessians, now and when it was last needed
   std::vector<int> negative; ///< pivots; of all rods together where the linear solver does not tell them apart
@@ -43,8 +46,9 @@ struct NewtonWork {
   std::vector<char> energy_known;                      ///< ... where it has been computed
   std::vector<IncrementalPotential::Residual> residual;
   std::vector<char> moving;  ///< rods whose supports have not reached their places
-  Planes increment, coordinates, motion, metric;
+  Planes increment, coordinates; ///< work arrays
   Configuration trial;
+  Planes motion, metric;
 };
 
 /// Solves for some rods that nothing joins to others.
@@ -101,6 +105,8 @@ private:
   void predict(const State &start);
   const IncrementalPotential::RodEnergy &energyAtIterate(int rod);
   void forgetEnergies() { fill(work_->energy_known, false); }
+  /// Moves what is shared with other blocks here.
+  void focus();
   template <class Value, class Same> void fill(std::vector<Value> &values, Same value) { std::fill(values.begin() + rods_.begin, values.begin() + rods_.end, value); }
   std::string nearBarrier() const;
 };
