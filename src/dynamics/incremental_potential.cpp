@@ -190,7 +190,7 @@ double IncrementalPotential::steepnessOf(const Configuration &c, int r) const {
 IncrementalPotential::RodEnergy IncrementalPotential::rodEnergy(const Configuration &c, int r) const {
   using std::abs;
   const RodRange &rod = elements_.rods[r];
-  const double blur = epsilon * reachOf(c, rod);
+  const double reach = reachOf(c, rod), steepness = steepnessOf(c, r), blur = epsilon * reach;
   Pack stretching(0.0);
   for (int i = rod.first_slot; i < rod.edgeEnd(); i += lanes) {
     const Pack stiffness = read<Pack>(axial_.stiffness() + i), delta = Pack(blur) * read<Pack>(elements_.inverseRestLength() + i);
@@ -198,8 +198,8 @@ IncrementalPotential::RodEnergy IncrementalPotential::rodEnergy(const Configurat
     stretching += (force + stiffness * delta) * Pack(blur);
   }
   // Edge, length, tangent and binormal each round.
-  const double delta = 4 * blur / shortest_cell_[r], bending = bending_[r] * steepnessOf(c, r);
-  RodEnergy result{0, reduce(stretching)};
+  const double delta = 4 * blur / shortest_cell_[r], bending = bending_[r] * steepness;
+  RodEnergy result{0, reduce(stretching), reach, steepness};
   for (const auto &term : terms_) {
     const double energy = term->energy(c, r);
     result.value += energy;
@@ -325,7 +325,7 @@ void IncrementalPotential::moveTo(const Planes &x, RodSet rods) {
   }
 }
 
-IncrementalPotential::Residual IncrementalPotential::residual(int r) {
+IncrementalPotential::Residual IncrementalPotential::residual(int r, const RodEnergy &energy) {
   using std::abs;
   const RodRange &rod = elements_.rods[r];
   const Material &m = scene_.rods[r].material;
@@ -344,8 +344,8 @@ IncrementalPotential::Residual IncrementalPotential::residual(int r) {
   }
   const double force = reduce(forces), moment = reduce(moments);
   // Coordinates carry an error of epsilon x reach: strains of epsilon reach/h, which the stiffnesses turn into forces and moments.
-  const double strain_noise = epsilon * reachOf(iterate_, rod) / shortest_[r], count = std::sqrt(double(rod.vertices));
-  const double bending = steepnessOf(iterate_, r) * std::max({m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness}) / shortest_[r];
+  const double strain_noise = epsilon * energy.reach / shortest_[r], count = std::sqrt(double(rod.vertices));
+  const double bending = energy.steepness * std::max({m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness}) / shortest_[r];
   const double scale = force_scale_[r], stretching = step_.mixed ? hmax(tension) : hmax(tension) + m.axial_stiffness;
   Residual result;
   result.force = std::sqrt(force) / scale;
@@ -364,16 +364,15 @@ void IncrementalPotential::Residual::include(const Residual &other) {
 
 IncrementalPotential::Residual IncrementalPotential::residual() {
   Residual worst;
-  for (int r = 0; r < all().end; ++r) worst.include(residual(r));
+  for (int r = 0; r < all().end; ++r) worst.include(residual(r, rodEnergy(iterate_, r)));
   return worst;
 }
 
-[[gnu::flatten]] void IncrementalPotential::commit(State &state) const {
-  state.time = step_.time;
-  ++state.step;
-  for (std::size_t n = 0; n < state.turns.size(); ++n) state.turns[n] = iterate_[C::turns][elements_.cell_slot[n]];
+[[gnu::flatten]] void IncrementalPotential::commit(State &state, RodSet rods) const {
   const double rate = step_.isStatic() ? 0 : 1 / step_.dt;
-  for (const RodRange &rod : elements_.rods) {
+  for (int r = rods.begin; r < rods.end; ++r) {
+    const RodRange &rod = elements_.rods[r];
+    for (int n = elements_.rod_cells[r]; n < elements_.rod_cells[r + 1]; ++n) state.turns[n] = iterate_[C::turns][elements_.cell_slot[n]];
     for (int i = 0; i < rod.vertices; ++i) {
       const int v = rod.first_vertex + i;
       const Vec3 x = iterate_.positionAt(rod.slot(i));

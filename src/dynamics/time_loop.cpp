@@ -42,11 +42,20 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
   PetscCall(PetscTime(&begin));
   EnergyBudget before = energyBudget(potential.scene(), potential.elements(), state, settings_.dynamic ? 1 : state.time);
   *finished = false;
+  State next = state; // what the blocks that have converged come to; the state itself stays as it is until all have
+  EnergyBudget energy;
   while (state.time < settings_.t_end) {
     const double h = std::min(dt, settings_.t_end - state.time);
     const Step step = stepOf(settings_, state, h);
     NewtonReport report;
+    energy = {};
+    solver_.on_block = [&](RodSet rods) {
+      potential.commit(next, rods);
+      for (int r = rods.begin; r < rods.end; ++r)
+        energy += energyBudget(potential.scene(), potential.elements(), next, potential.iterate(), settings_.dynamic ? 1 : step.time, r);
+    };
     PetscCall(solver_.solve(state, step, &report));
+    solver_.on_block = nullptr;
     // Couples have no potential: the inertia of the symmetric part says nothing about stability.
     const bool detects = !settings_.dynamic && settings_.bifurcation != Bifurcation::off && potential.scene().moments.empty();
     if (detects && stable && report.first_negative_pivots > 0 && located_ <= state.time) {
@@ -54,9 +63,12 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
       PetscCall(locate(state, step, &stop));
       *finished = stop;
       if (stop) PetscFunctionReturn(0);
-      PetscCall(solver_.solve(state, step, &report)); // the potential held the bisection's last step
     }
-    if (report.converged) potential.commit(state);
+    if (report.converged) {
+      next.time = step.time;
+      next.step = state.step + 1;
+      std::swap(state, next);
+    }
     if (!report.converged) { // the state was not touched
       ++rejected;
       good = 0;
@@ -79,7 +91,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     Diagnostics row;
     row.time = state.time;
     row.dt = h;
-    row.energy = energyBudget(potential.scene(), potential.elements(), state, potential.iterate(), settings_.dynamic ? 1 : state.time);
+    row.energy = energy;
     row.dissipated = before.total() - row.energy.total();
     before = row.energy;
     row.newton_iterations = report.iterations;

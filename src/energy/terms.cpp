@@ -14,35 +14,59 @@ std::vector<std::unique_ptr<Term>> makeTerms(const Scene &scene, const Elements 
   return terms;
 }
 
-EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, const Configuration &c, double load_factor) {
+[[gnu::flatten]] EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, const Configuration &c, double load_factor, int r) {
   EnergyBudget budget;
-  for (std::size_t r = 0; r < scene.rods.size(); ++r) {
-    const RodRange &rod = elements.rods[r];
-    for (int i = 0; i < rod.vertices; ++i) {
-      const int v = rod.first_vertex + i;
-      const double mass = elements.mass()[rod.slot(i)];
-      budget.kinetic += 0.5 * mass * state.velocity[v].squaredNorm();
-      if (scene.rods[r].gravity) budget.gravity -= load_factor * mass * scene.gravity.dot(state.position[v]);
-    }
-    for (int i = 0; i < rod.edges; ++i) {
-      const int slot = rod.slot(i);
-      const double s = c[Configuration::strain][slot], rate = state.twist_rate[rod.first_edge + i];
-      budget.stretch += 0.5 * elements.axialStiffness()[slot] * s * s * elements.restLength()[slot];
-      budget.kinetic += 0.5 * elements.twistMass()[slot] * rate * rate;
-    }
-    forCells(elements, int(r), [&]<class T>(const LooseCell &cell, int count) {
-      const std::array<T, 3> s = presentStrain<T>(elements, c, int(r), cell, count);
-      for (int k = 0; k < 3; ++k) {
-        const T d = s[k] - read<T>(elements.cells()[cell_rest + k] + cell.slot);
-        (k < 2 ? budget.bend : budget.twist) += sum(T(T(0.5) * read<T>(elements.cells()[cell_stiffness + k] + cell.slot) * d * d));
-      }
-    });
+  const RodRange &rod = elements.rods[r];
+  double kinetic = 0, gravity = 0;
+  for (int i = 0; i < rod.vertices; ++i) {
+    const int v = rod.first_vertex + i;
+    const double mass = elements.mass()[rod.slot(i)];
+    kinetic += mass * state.velocity[v].squaredNorm();
+    gravity += mass * scene.gravity.dot(state.position[v]);
   }
+  for (int i = 0; i < rod.edges; ++i) kinetic += elements.twistMass()[rod.slot(i)] * state.twist_rate[rod.first_edge + i] * state.twist_rate[rod.first_edge + i];
+  budget.kinetic = 0.5 * kinetic;
+  budget.gravity = scene.rods[r].gravity ? -load_factor * gravity : 0;
+  Pack stretch(0.0), bend(0.0), twist(0.0);
+  for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
+    const Pack strain = read<Pack>(c[Configuration::strain] + s);
+    stretch += read<Pack>(elements.axialStiffness() + s) * strain * strain * read<Pack>(elements.restLength() + s);
+  }
+  forCells(elements, r, [&]<class T>(const LooseCell &cell, int count) {
+    const std::array<T, 3> s = presentStrain<T>(elements, c, r, cell, count);
+    std::array<T, 3> e;
+    for (int k = 0; k < 3; ++k) {
+      const T d = s[k] - read<T>(elements.cells()[cell_rest + k] + cell.slot);
+      e[k] = read<T>(elements.cells()[cell_stiffness + k] + cell.slot) * d * d;
+    }
+    if constexpr (std::is_same_v<T, Pack>) {
+      bend += e[0] + e[1];
+      twist += e[2];
+    } else {
+      budget.bend += 0.5 * (e[0] + e[1]);
+      budget.twist += 0.5 * e[2];
+    }
+  });
+  budget.stretch = 0.5 * reduce(stretch);
+  budget.bend += 0.5 * reduce(bend);
+  budget.twist += 0.5 * reduce(twist);
   return budget;
 }
 
+EnergyBudget &EnergyBudget::operator+=(const EnergyBudget &other) {
+  kinetic += other.kinetic;
+  stretch += other.stretch;
+  bend += other.bend;
+  twist += other.twist;
+  gravity += other.gravity;
+  return *this;
+}
+
 EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, double load_factor) {
-  return energyBudget(scene, elements, state, configurationOf(state, scene, elements, state.time), load_factor);
+  EnergyBudget budget;
+  const Configuration c = configurationOf(state, scene, elements, state.time);
+  for (int r = 0; r < int(elements.rods.size()); ++r) budget += energyBudget(scene, elements, state, c, load_factor, r);
+  return budget;
 }
 
 } // namespace tendril

@@ -105,8 +105,8 @@ template <class T> void substitute(const T *band, const T *far, int rows, T *x) 
 
 } // namespace
 
-BandedFactor::BandedFactor(const DofMap &dofs, RodSet set)
-    : dofs_(dofs), rods_(set), order_(set.end - set.begin), fixed_(order_.size()), negative_(order_.size(), 0), neutral_(order_.size(), 0) {
+BandedFactor::BandedFactor(const DofMap &dofs, RodSet set, BandedRoom &room)
+    : dofs_(dofs), rods_(set), order_(set.end - set.begin), fixed_(order_.size()), negative_(order_.size(), 0), neutral_(order_.size(), 0), room_(room) {
   const auto &rods = dofs.rods();
   auto shape = [&](int r) { return std::pair(rods[r].vertices, rods[r].closed); };
   std::iota(order_.begin(), order_.end(), set.begin);
@@ -123,9 +123,13 @@ BandedFactor::BandedFactor(const DofMap &dofs, RodSet set)
     far = std::max(far, g.far + n * border * (g.packed ? lanes : 1));
     rows = std::max(rows, n * (g.packed ? lanes : 1));
   }
-  band_.assign(band, 0.0);
-  far_.assign(far, 0.0);
-  rows_.assign(rows, 0.0);
+  auto grow = [&](AlignedVector &v, std::size_t size) {
+    if (v.size() < size) v.resize(size, 0.0);
+    bytes_ += size * sizeof(double);
+  };
+  grow(room.band, band);
+  grow(room.far, far);
+  grow(room.rows, rows);
 }
 
 /// Groups of the wanted rods of each shape: whole packs; of the rest, a pack when that is cheaper than one after the other.
@@ -180,8 +184,8 @@ template <class T> void BandedFactor::factorGroup(const Group &group, const Band
   constexpr int w = width<T>, tile = 16;
   const RodRange &first = dofs_.rods()[group.rod[0]];
   const int n = first.vertices, rows = slot_size * n;
-  T *band = as<T>(&band_[group.band]) + half_band * w;
-  T *far = first.closed ? as<T>(&far_[group.far]) : nullptr;
+  T *band = as<T>(&room_.band[group.band]) + half_band * w;
+  T *far = first.closed ? as<T>(&room_.far[group.far]) : nullptr;
   std::fill(band - half_band * w, band, T(0.0));
   std::fill(band + std::size_t(rows) * w, band + std::size_t(rows + half_band) * w, T(0.0));
   std::array<const double *, lanes> source{};
@@ -261,8 +265,8 @@ void BandedFactor::solve(const PetscScalar *b, PetscScalar *x) {
   for (const Group &group : groups_) solved += group.count;
   if (solved < order_.size()) {
     if (x == b) {
-      copy_.assign(b, b + dofs_.unknowns(rods_));
-      b = copy_.data();
+      room_.copy.assign(b, b + dofs_.unknowns(rods_));
+      b = room_.copy.data();
     }
     std::fill_n(x, dofs_.unknowns(rods_), 0.0);
   }
@@ -277,9 +281,9 @@ template <class T> void BandedFactor::solveGroup(const Group &group, const Petsc
   constexpr int step = sizeof(T) / sizeof(double);
   const RodRange &first = dofs_.rods()[group.rod[0]];
   const int rows = slot_size * first.vertices;
-  const T *band = as<T>(&band_[group.band]) + half_band * width<T>;
-  const T *far = first.closed ? as<T>(&far_[group.far]) : nullptr;
-  double *values = rows_.data() + half_band * step;
+  const T *band = as<T>(&room_.band[group.band]) + half_band * width<T>;
+  const T *far = first.closed ? as<T>(&room_.far[group.far]) : nullptr;
+  double *values = room_.rows.data() + half_band * step;
   std::fill(values - half_band * step, values, 0.0);
   std::fill(values + std::size_t(rows) * step, values + std::size_t(rows + half_band) * step, 0.0);
   auto eachUnknown = [&](auto visit) {
@@ -379,7 +383,7 @@ PetscErrorCode create(Mat a, MatFactorType, Mat *out) {
   PetscCall(MatSetSizes(f, a->rmap->n, a->cmap->n, a->rmap->N, a->cmap->N));
   PetscCall(PetscStrallocpy(name, &((PetscObject)f)->type_name));
   PetscCall(MatSetUp(f));
-  f->data = new BandedFactor(*system->dofs, system->rods);
+  f->data = new BandedFactor(*system->dofs, system->rods, *system->room);
   f->ops->choleskyfactorsymbolic = symbolic;
   f->ops->getinfo = getInfo;
   f->ops->destroy = destroy;

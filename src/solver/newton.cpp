@@ -92,7 +92,7 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
   rods_ = set;
   DofMap &dofs = potential.dofs();
   work_ = &work;
-  system_ = {&dofs, set, &potential.band(), &work.metric, &work.wanted, &work.shift};
+  system_ = {&dofs, set, &potential.band(), &work.metric, &work.wanted, &work.shift, &work.room};
   const bool whole = set.begin == 0 && set.end == dofs.all().end;
   if (whole)
     PetscCall(DMCreateGlobalVector(dofs.dm(), x_.out()));
@@ -243,7 +243,7 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
     const RodRange &rod = potential_->elements().rods[r];
     IncrementalPotential::Residual &residual = work_->residual[r];
     if (work_->wanted[r]) { // a rod that has converged takes no part any more
-      residual = potential_->residual(r);
+      residual = potential_->residual(r, energyAtIterate(r));
       work_->moving[r] = moving && dot(rod, work_->motion, work_->motion) > 0;
       finite = finite && residual.isFinite();
       work_->wanted[r] = work_->moving[r] || !isSmall(residual, rtol);

@@ -58,6 +58,7 @@ PetscErrorCode StepSolver::solve(const State &start, const Step &step, NewtonRep
     PetscCall(block.solve(start, &one, seek, guess));
     report->include(one);
     if (!one.converged) break;
+    if (on_block) on_block(block.rods());
   }
   PetscFunctionReturn(0);
 }

@@ -70,7 +70,8 @@ void expectSolvesAndCounts(const std::vector<int> &rods, double diagonal, bool h
   if (held) p.scene.supports = {hold(p.scene, 0, 0, Support::Kind::pin), hold(p.scene, 0, 3, Support::Kind::pin)};
   ASSERT_EQ(p.dofs.setUp(p.scene), PetscErrorCode(0));
   fill(p, diagonal);
-  BandedFactor banded(p.dofs, p.dofs.all());
+  BandedRoom room;
+  BandedFactor banded(p.dofs, p.dofs.all(), room);
   const Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(p.dense.rows(), -1, 2);
   Eigen::VectorXd x(b.size());
   for (int repeat = 0; repeat < 2; ++repeat) { // refactoring starts afresh
@@ -109,7 +110,8 @@ TEST(Banded, RodsThatAreNotWantedStandStill) {
   addRods(p.scene, std::vector<int>(2 * lanes, 6));
   ASSERT_EQ(p.dofs.setUp(p.scene), PetscErrorCode(0));
   fill(p, 12);
-  BandedFactor banded(p.dofs, p.dofs.all());
+  BandedRoom room;
+  BandedFactor banded(p.dofs, p.dofs.all(), room);
   Eigen::VectorXd b = Eigen::VectorXd::Constant(p.dense.rows(), 1.0), all(b.size()), some(b.size());
   banded.factor(p.system);
   banded.solve(b.data(), all.data());
@@ -127,7 +129,8 @@ TEST(Banded, AShiftOfOneRodIsAddedToItsDiagonal) {
   addRods(p.scene, std::vector<int>(lanes + 1, 6));
   ASSERT_EQ(p.dofs.setUp(p.scene), PetscErrorCode(0));
   fill(p, -1);
-  BandedFactor banded(p.dofs, p.dofs.all());
+  BandedRoom room;
+  BandedFactor banded(p.dofs, p.dofs.all(), room);
   p.shift[2] = 20; // more than the sum of the others in any row
   p.shift[lanes] = 20;
   banded.factor(p.system);
@@ -146,7 +149,8 @@ TEST(Banded, CountsNeutralMotionsAndStandsStill) {
     p.band.entry(p.dofs.rods()[0], 0, 0)[i] = 1.3 * ((i > 0) + (i < 11));
     if (i < 11) p.band.entry(p.dofs.rods()[0], 0, slot_size)[i] = -1.3;
   }
-  BandedFactor banded(p.dofs, p.dofs.all());
+  BandedRoom room;
+  BandedFactor banded(p.dofs, p.dofs.all(), room);
   banded.factor(p.system);
   EXPECT_EQ(banded.negativePivots(0), 0);
   EXPECT_EQ(banded.neutralPivots(0), 1);

@@ -38,6 +38,7 @@ public:
   /// Energy of a rod [J]; +inf where the configuration is impossible. Rounding blurs it by `noise`: differences below decide nothing [J].
   struct RodEnergy {
     double value = std::numeric_limits<double>::infinity(), noise = 0;
+    double reach = 0, steepness = 1; ///< largest coordinate [m]; how much stiffer than at rest the steepest cell is
   };
   RodEnergy rodEnergy(const Configuration &configuration, int rod) const;
   double energy(const Configuration &configuration, RodSet rods) const;
@@ -82,12 +83,19 @@ public:
     void include(const Residual &other); ///< the larger of each; not a number is the largest
     bool isFinite() const { return std::isfinite(force) && std::isfinite(moment); }
   };
-  Residual residual(int rod);
+  /// \param energy that of the iterate
+  Residual residual(int rod, const RodEnergy &energy);
   /// The largest of each over all rods.
   Residual residual();
 
-  /// State after the step: velocities by backward Euler, directors made orthonormal.
-  void commit(State &state) const;
+  /// State of some rods after the step: velocities by backward Euler, directors made orthonormal.
+  void commit(State &state, RodSet rods) const;
+  /// Of all, with the time.
+  void commit(State &state) const {
+    commit(state, all());
+    state.time = step_.time;
+    ++state.step;
+  }
 
 private:
   const Scene &scene_;

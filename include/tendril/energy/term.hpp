@@ -84,9 +84,11 @@ template <class T> std::array<T, 3> presentStrain(const Elements &elements, cons
 struct EnergyBudget {
   double kinetic = 0, stretch = 0, bend = 0, twist = 0, gravity = 0;
   double total() const { return kinetic + stretch + bend + twist + gravity; }
+  EnergyBudget &operator+=(const EnergyBudget &other);
 };
-/// \param configuration that of the state
-EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, const Configuration &configuration, double load_factor);
+/// Of one rod. \param configuration that of the state
+EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, const Configuration &configuration, double load_factor, int rod);
+/// Of all rods.
 EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, double load_factor);
 
 } // namespace tendril

@@ -8,6 +8,11 @@
 
 namespace tendril {
 
+/// Memory for factors. Solvers that work one after the other may share it: a factor is lost when the next is made.
+struct BandedRoom {
+  AlignedVector band, far, rows, copy;
+};
+
 /// What there is to factor: band + shift x metric of the rods that are wanted.
 struct BandedSystem {
   const DofMap *dofs = nullptr;
@@ -16,11 +21,12 @@ struct BandedSystem {
   const Planes *metric = nullptr;
   const std::vector<char> *wanted = nullptr;  ///< per rod of the scene; the others are left out, and a solve gives them zero
   const std::vector<double> *shift = nullptr; ///< per rod of the scene
+  BandedRoom *room = nullptr;
 };
 
 class BandedFactor {
 public:
-  BandedFactor(const DofMap &dofs, RodSet rods);
+  BandedFactor(const DofMap &dofs, RodSet rods, BandedRoom &room);
 
   void factor(const BandedSystem &system);
   /// By the unknowns of the rods; x may be b.
@@ -31,7 +37,7 @@ public:
   /// Pivots lost in rounding (|pivot| within a few epsilon of its diagonal): motions that cost no energy. They are replaced by a small
   /// positive number, so that a solve does not move along them.
   int neutralPivots(int rod) const { return neutral_[rod - rods_.begin]; }
-  std::size_t bytes() const { return (band_.size() + far_.size() + rows_.size()) * sizeof(double); }
+  std::size_t bytes() const { return bytes_; }
 
 private:
   /// Rods factored together: one, or as many as there are lanes of a pack.
@@ -47,7 +53,8 @@ private:
   std::vector<std::vector<int>> fixed_; ///< per rod: rows that are held or do not exist
   std::vector<Group> groups_;
   std::vector<int> negative_, neutral_;
-  AlignedVector band_, far_, rows_, copy_;
+  BandedRoom &room_;
+  std::size_t bytes_ = 0;
 
   void plan(const char *wanted);
   template <class T> void factorGroup(const Group &group, const BandedSystem &system);

@@ -49,6 +49,7 @@ struct NewtonWork {
   Planes increment, coordinates; ///< work arrays
   Configuration trial;
   Planes motion, metric;
+  BandedRoom room;
 };
 
 /// Solves for some rods that nothing joins to others.
@@ -66,6 +67,7 @@ public:
 
   SNES snes() const { return snes_; }
   bool isBanded() const { return banded_; }
+  RodSet rods() const { return rods_; }
 
   // What SNES calls.
   PetscErrorCode evaluate(Vec x, Vec f);

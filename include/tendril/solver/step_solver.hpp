@@ -6,6 +6,7 @@
 #include "tendril/solver/newton.hpp"
 
 #include <deque>
+#include <functional>
 #include <optional>
 
 namespace tendril {
@@ -19,6 +20,8 @@ public:
   /// Minimises the potential of the step. The potential's iterate is the answer when `report` says converged; iterations are the most of any block.
   /// \param guess displacements and spins to start from instead of the start state
   PetscErrorCode solve(const State &start, const Step &step, NewtonReport *report, Seek seek = Seek::minimum, const Planes *guess = nullptr);
+  /// Called with each block that has converged, while it is in the cache.
+  std::function<void(RodSet)> on_block;
   /// Starts a step without solving it.
   void begin(const State &start, const Step &step);
   /// Sets the linear solvers up as a step would, so that their options have been asked for before the first step.
