@@ -30,28 +30,45 @@ template <class T> T countedPivot(const T &d, const T &diagonal, T &negative, T 
   return select(lost, select(scale > T(0.0), T(1e-6) * scale, T(1.0)), d);
 }
 
+/// Eight couplings of one row.
+typedef double Octet __attribute__((vector_size(64), aligned(8)));
+Octet &octet(double *p) { return *reinterpret_cast<Octet *>(p); }
+
+/// Subtracts from the rows below row j its share, r rows below: l[r] (row[r], row[r + 1], ...). The couplings of one rod lie in two registers and
+/// are shifted there: shifted loads would wait for the stores before them.
+template <int r = 1> inline void subtractBelow(double *row, const Octet &near, const Octet &far, const double *l) {
+  if constexpr (r <= half_band) {
+    double *below = row + r * width<double>;
+    const Octet first = [&]<int... c>(std::integer_sequence<int, c...>) { return __builtin_shufflevector(near, far, std::min(c + r, 15)...); }(std::make_integer_sequence<int, 8>{});
+    octet(below) -= l[r] * first;
+    if constexpr (r < 3) {
+      const Octet second = [&]<int... c>(std::integer_sequence<int, c...>) { return __builtin_shufflevector(far, Octet{}, (c + r)...); }(std::make_integer_sequence<int, 8>{});
+      octet(below + 8) -= l[r] * second;
+    }
+    subtractBelow<r + 1>(row, near, far, l);
+  }
+}
+
 /// Right-looking elimination: each row updates the ten below it, and for a ring the border.
 /// \param far rows x border couplings beyond the band, or null
 template <class T> void eliminate(T *band, T *far, int rows, T &negative, T &neutral) {
   constexpr int w = width<T>;
   const int first_border = rows - border;
-  T u[band_width + 8], l[band_width];
-  for (T &v : u) v = T(0.0);
+  T u[band_width], l[band_width];
   for (int j = 0; j < rows; ++j) {
     T *row = band + std::size_t(j) * w;
-    const T inverse = T(1.0) / countedPivot(row[0], row[diagonal_place], negative, neutral);
+    const T diagonal = row[diagonal_place];
+    const T inverse = T(1.0) / countedPivot(row[0], diagonal, negative, neutral);
     for (int r = 1; r <= half_band; ++r) {
       u[r] = row[r];
       l[r] = u[r] * inverse;
     }
-    for (int r = 1; r <= half_band; ++r) {
-      T *below = row + r * w;
-      if constexpr (std::is_same_v<T, double>) {
-        for (int c = 0; c < 8; ++c) below[c] -= l[r] * u[r + c]; // whole registers: what lies beyond the band is zero
-        for (int c = 8; c <= half_band - r; ++c) below[c] -= l[r] * u[r + c];
-      } else
-        for (int c = 0; c <= half_band - r; ++c) below[c] -= l[r] * u[r + c];
-    }
+    if constexpr (std::is_same_v<T, double>) {
+      const Octet near = octet(row), beyond = octet(row + 8);
+      subtractBelow(row, near, Octet{beyond[0], beyond[1], beyond[2]}, l);
+    } else
+      for (int r = 1; r <= half_band; ++r)
+        for (int c = 0; c <= half_band - r; ++c) row[r * w + c] -= l[r] * u[r + c];
     // Border rows beyond the band of row j: they meet the rows within it, and each other.
     for (int q = 0; far && q < border; ++q) {
       const int i = first_border + q;
@@ -77,29 +94,28 @@ template <class T> void eliminate(T *band, T *far, int rows, T &negative, T &neu
 template <class T> void substitute(const T *band, const T *far, int rows, T *x) {
   constexpr int w = width<T>;
   const int first_border = rows - border;
+  // The nearest neighbour last and alone: the rest of a sum does not wait for it.
+  T last(0.0);
   for (int j = 0; j < rows; ++j) {
     const T *above = band + std::ptrdiff_t(j - half_band) * w;
-    T even(0.0), odd(0.0); // the nearest last: the others do not wait for it
-    for (int r = half_band; r >= 2; r -= 2) {
-      even += above[(half_band - r) * w + r] * x[j - r];
-      odd += above[(half_band - r + 1) * w + r - 1] * x[j - r + 1];
-    }
+    auto share = [&](int r) { return above[(half_band - r) * w + r] * x[j - r]; };
+    const T even = (share(10) + share(8)) + (share(6) + (share(4) + share(2))), odd = (share(9) + share(7)) + (share(5) + share(3));
     T value = x[j] - (even + odd);
     if (far && j >= first_border)
       for (int k = 0; j - k > half_band; ++k) value -= far[std::size_t(k) * border + (j - first_border)] * x[k];
-    x[j] = value;
+    last = value - above[(half_band - 1) * w + 1] * last;
+    x[j] = last;
   }
+  last = T(0.0);
   for (int j = rows - 1; j >= 0; --j) {
     const T *row = band + std::size_t(j) * w;
-    T even(0.0), odd(0.0);
-    for (int r = half_band; r >= 2; r -= 2) {
-      even += row[r] * x[j + r];
-      odd += row[r - 1] * x[j + r - 1];
-    }
+    auto share = [&](int r) { return row[r] * x[j + r]; };
+    const T even = (share(10) + share(8)) + (share(6) + (share(4) + share(2))), odd = (share(9) + share(7)) + (share(5) + share(3));
     T value = x[j] * row[0] - (even + odd);
     for (int q = 0; far && q < border; ++q)
       if (first_border + q - j > half_band) value -= far[std::size_t(j) * border + q] * x[first_border + q];
-    x[j] = value;
+    last = value - row[1] * last;
+    x[j] = last;
   }
 }
 
