@@ -1,0 +1,120 @@
+#include "tendril/io/accuracy.hpp"
+
+#include <algorithm>
+#include <iomanip>
+#include <map>
+#include <sstream>
+
+namespace tendril {
+namespace {
+
+constexpr int first_edges = 8;
+constexpr double largest_turning = 30 * pi / 180; ///< per vertex, at first [rad]
+constexpr double aim = 0.8, accept = 0.95;        ///< of the tolerance: an estimate is a few percent off itself
+constexpr int most_rounds = 8;
+constexpr double most_vertices = 1e6; ///< of all rods together
+
+std::string text(double value) {
+  std::ostringstream s;
+  s << std::setprecision(3) << value;
+  return s.str();
+}
+
+int roundedUp(double edges, int multiple) { return multiple * std::max(1, int(std::ceil(edges / multiple * (1 - 1e-12)))); }
+
+/// Edges enough to show the shape of a rod, as drawn and at rest.
+int firstEdges(const Rod &rod, const Drawing &drawing, int multiple) {
+  double length = 0;
+  for (int i = 0; i < rod.edges(); ++i) length += rod.edge(i).norm();
+  double turning = rod.natural == Rod::Natural::given ? rod.natural_strain.head<2>().norm() * length : 0;
+  turning = std::max(turning, 2 * pi * std::abs(rod.initial_turns));
+  if (drawing.curve) {
+    const int samples = std::max(1000, 4 * rod.edges());
+    double along = 0;
+    Vec3 before = drawing.curve(1.0 / samples) - drawing.curve(0);
+    for (int i = 1; i < samples; ++i) {
+      const Vec3 e = drawing.curve((i + 1.0) / samples) - drawing.curve(double(i) / samples);
+      along += std::atan2(before.cross(e).norm(), before.dot(e));
+      before = e;
+    }
+    turning = std::max(turning, along);
+  }
+  return roundedUp(std::max<double>(first_edges, turning / largest_turning), multiple);
+}
+
+std::string nameOf(Quantity q) { return q == Quantity::tip ? "tip" : q == Quantity::energy ? "energy" : "position"; }
+
+/// What one round found.
+struct Round {
+  std::vector<double> error; ///< per rod
+  std::string none;          ///< why there is no estimate
+};
+
+PetscErrorCode estimateAt(const Scene &scene, const std::vector<Drawing> &drawings, const LoopSettings &settings, const std::vector<int> &edges, Quantity of, Round *round) {
+  PetscFunctionBeginUser;
+  std::vector<int> twice = edges;
+  for (int &n : twice) n *= 2;
+  const Scene coarse = redraw(scene, drawings, edges);
+  Answer a, b;
+  PetscCall(solveStatics(coarse, settings, &a));
+  if (a.found) PetscCall(solveStatics(redraw(scene, drawings, twice), settings, &b));
+  if (!a.found || !b.found) {
+    round->none = a.found ? b.failure : a.failure;
+    PetscFunctionReturn(0);
+  }
+  const Estimate e = richardson(coarse, a, b);
+  round->none = e.none;
+  for (const RodEstimate &r : e.rods)
+    round->error.push_back(of == Quantity::energy ? (e.elasticError() > 0 ? e.elasticError() / e.elasticEnergy() : 0) : (of == Quantity::tip ? r.tip : r.error) / r.length);
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode chooseEdges(const Scene &scene, const std::vector<Drawing> &drawings, const LoopSettings &settings, const Accuracy &accuracy, Choice *choice) {
+  PetscFunctionBeginUser;
+  const std::size_t rods = scene.rods.size();
+  std::vector<int> edges, multiple;
+  for (std::size_t r = 0; r < rods; ++r) {
+    multiple.push_back(edgeMultiple(scene, drawings[r], int(r)));
+    edges.push_back(firstEdges(scene.rods[r], drawings[r], multiple[r]));
+  }
+  const std::string asked = "option -accuracy: an error of the " + nameOf(accuracy.of) + " below " + text(accuracy.tolerance);
+  for (int round = 0; round < most_rounds; ++round) {
+    double vertices = 0;
+    for (const int n : edges) vertices += n;
+    if (vertices > most_vertices) throw SceneError(asked + " needs more than " + text(most_vertices) + " edges; write a larger tolerance");
+    Round found;
+    PetscCall(estimateAt(scene, drawings, settings, edges, accuracy.of, &found));
+    double worst = 0;
+    std::size_t where = 0;
+    for (std::size_t r = 0; r < found.error.size(); ++r)
+      if (found.error[r] > worst) worst = found.error[where = r];
+    if (found.none.empty() && worst <= accept * accuracy.tolerance) {
+      choice->edges = edges;
+      choice->error = found.error;
+      std::map<std::pair<int, double>, std::vector<std::size_t>> alike; // rods of the same edges and errors, as copies are
+      for (std::size_t r = 0; r < rods; ++r) alike[{edges[r], found.error[r]}].push_back(r);
+      for (const auto &[key, members] : alike)
+        choice->lines.push_back("accuracy: rod '" + scene.rods[members[0]].name + "'" + (members.size() > 1 ? " and " + std::to_string(members.size() - 1) + " like it" : "") + ": edges " +
+                                std::to_string(key.first) + " for " + text(accuracy.tolerance) + ": estimated error of the " + nameOf(accuracy.of) + " " + text(key.second));
+      PetscFunctionReturn(0);
+    }
+    choice->lines.push_back("accuracy: tried " + std::to_string(edges[where]) + " edges of rod '" + scene.rods[where].name + "': " +
+                            (found.none.empty() ? "estimated error of the " + nameOf(accuracy.of) + " " + text(worst) : found.none));
+    for (std::size_t r = 0; r < rods; ++r) {
+      if (!found.none.empty()) {
+        edges[r] *= 2;
+        continue;
+      }
+      if (found.error[r] <= accept * accuracy.tolerance) continue;
+      // A first estimate may be far off: not more than 16 times as many at once.
+      const double factor = std::min(std::sqrt(found.error[r] / (aim * accuracy.tolerance)), 16.0);
+      edges[r] = std::max(roundedUp(edges[r] * factor, multiple[r]), edges[r] + multiple[r]);
+    }
+  }
+  throw SceneError(asked + " was not reached: " + choice->lines.back().substr(std::string("accuracy: ").size()) + "; write a larger tolerance" +
+                   (accuracy.tolerance < 1e-6 ? " or a smaller -snes_rtol" : ""));
+}
+
+} // namespace tendril
