@@ -54,16 +54,17 @@ PetscErrorCode estimateAt(const Scene &scene, const std::vector<Drawing> &drawin
   PetscFunctionBeginUser;
   std::vector<int> twice = edges;
   for (int &n : twice) n *= 2;
-  const Scene coarse = redraw(scene, drawings, edges);
-  Answer a, b;
-  PetscCall(solveStatics(coarse, settings, &a));
-  if (a.found) PetscCall(solveStatics(redraw(scene, drawings, twice), settings, &b));
-  if (!a.found || !b.found) {
-    round->none = a.found ? b.failure : a.failure;
+  Simulation run;
+  Answer answer;
+  PetscCall(solveStatics(run, redraw(scene, drawings, edges), settings, &answer));
+  if (!answer.found) {
+    round->none = answer.failure;
     PetscFunctionReturn(0);
   }
-  const Estimate e = richardson(coarse, a, b);
+  Estimate e;
+  PetscCall(estimateError(run, {}, redraw(scene, drawings, twice), settings, &e));
   round->none = e.none;
+  if (!e.none.empty()) PetscFunctionReturn(0);
   for (const RodEstimate &r : e.rods)
     round->error.push_back(of == Quantity::energy ? (e.elasticError() > 0 ? e.elasticError() / e.elasticEnergy() : 0) : (of == Quantity::tip ? r.tip : r.error) / r.length);
   PetscFunctionReturn(0);

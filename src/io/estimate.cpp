@@ -1,6 +1,6 @@
 #include "tendril/io/estimate.hpp"
 
-#include "tendril/dynamics/simulation.hpp"
+#include "tendril/dynamics/prolong.hpp"
 
 #include <algorithm>
 #include <iomanip>
@@ -32,21 +32,69 @@ std::string exactly(double value) {
 
 } // namespace
 
-PetscErrorCode solveStatics(Scene scene, const LoopSettings &settings, Answer *answer) {
+Answer answerOf(const Simulation &run, std::vector<double> critical) {
+  return {true, "", run.state.time, run.state.position, energyBudget(run.scene, *run.elements, run.state, run.state.time), std::move(critical)};
+}
+
+PetscErrorCode solveStatics(Simulation &run, Scene scene, const LoopSettings &settings, Answer *answer) {
   PetscFunctionBeginUser;
-  Simulation run;
   PetscCall(run.setUp(std::move(scene), settings));
   TimeLoop loop(run.solver, settings);
+  std::vector<double> critical;
   loop.on_critical = [&](const CriticalPoint &point) {
-    answer->critical.push_back(point.load_factor);
+    critical.push_back(point.load_factor);
     return PetscErrorCode(0);
   };
+  bool found;
   PetscCall(loop.run(
-      run.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &answer->found));
+      run.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &found));
+  *answer = answerOf(run, std::move(critical));
+  answer->found = found;
   answer->failure = loop.failure();
-  answer->load_factor = run.state.time;
-  answer->energy = energyBudget(run.scene, *run.elements, run.state, run.state.time);
-  answer->position = std::move(run.state.position);
+  PetscFunctionReturn(0);
+}
+
+/// One step without a load step, from the answer of `run` on its edges cut in two.
+static PetscErrorCode solveFrom(const Simulation &run, const Scene &scene, const LoopSettings &settings, Answer *answer) {
+  Simulation fine;
+  NewtonReport report;
+  PetscFunctionBeginUser;
+  PetscCall(fine.setUp(scene, settings));
+  fine.state = prolonged(run.state, run.scene, *run.elements, fine.scene, *fine.elements);
+  PetscCall(fine.solver.solve(fine.state, TimeLoop::stepOf(settings, fine.state, 0), &report));
+  if (report.converged) {
+    fine.potential->commit(fine.state);
+    *answer = answerOf(fine);
+  } else
+    answer->failure = report.reason;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode estimateError(const Simulation &run, const std::vector<double> &critical, const Scene &scene, const LoopSettings &settings, Estimate *estimate) {
+  PetscFunctionBeginUser;
+  const Answer coarse = answerOf(run, critical);
+  Answer fine;
+  estimate->none = "the run ended before its full load";
+  if (coarse.load_factor == settings.t_end) {
+    PetscCall(solveFrom(run, scene, settings, &fine));
+    estimate->none = fine.failure;
+    if (fine.found) *estimate = richardson(run.scene, coarse, fine);
+    if (estimate->none.empty() && critical.empty()) PetscFunctionReturn(0);
+  }
+  Simulation path;
+  PetscCall(solveStatics(path, scene, settings, &fine));
+  if (!fine.found) {
+    (estimate->none.empty() ? estimate->no_critical : estimate->none) = "with half the edges' lengths, " + fine.failure;
+    PetscFunctionReturn(0);
+  }
+  if (!estimate->none.empty()) *estimate = richardson(run.scene, coarse, fine);
+  if (fine.critical.size() != critical.size())
+    estimate->no_critical = text(critical.size(), " were found, ", fine.critical.size(), " with half the edges' lengths");
+  else
+    for (std::size_t k = 0; k < critical.size(); ++k) {
+      estimate->critical.push_back(fine.critical[k] + (fine.critical[k] - critical[k]) / 3);
+      estimate->critical_error.push_back(std::abs(fine.critical[k] - critical[k]) * 4 / 3);
+    }
   PetscFunctionReturn(0);
 }
 
@@ -86,24 +134,21 @@ Estimate richardson(const Scene &scene, const Answer &coarse, const Answer &fine
 }
 
 std::vector<std::string> describe(const Estimate &e, const Scene &scene) {
-  if (!e.none.empty()) return {"no estimate: " + e.none};
-  const RodEstimate &worst = e.rods[e.worstRod()];
-  std::vector<std::string> lines{text("estimated error: position ", worst.error, " m, ", worst.error / worst.length, " of the length of rod '", scene.rods[e.worstRod()].name,
-                                      "' (vertex ", worst.vertex, ")")};
-  std::string line;
-  for (const auto &[name, member] : energies)
-    if (e.energy.*member != 0)
-      line += (line.empty() ? "" : ", ") + std::string(name) + " energy " + text(std::abs(e.energy_error.*member), " of ") + exactly(e.energy.*member) + " J";
-  if (!line.empty()) lines.push_back("estimated error: " + line);
-  if (e.tan) lines.push_back("measure tan: the estimate holds, but its series has more terms than that of measure angle, with which the extrapolated positions are much closer");
-  return lines;
-}
-
-std::vector<std::string> describeCritical(const std::vector<double> &coarse, const std::vector<double> &fine) {
-  if (coarse.size() != fine.size()) return {text("no estimate of critical load factors: ", coarse.size(), " were found, and ", fine.size(), " with half the edges' lengths")};
   std::vector<std::string> lines;
-  for (std::size_t k = 0; k < coarse.size(); ++k)
-    lines.push_back(text("estimated error: critical load factor ", std::abs(fine[k] - coarse[k]) * 4 / 3, ", extrapolated ", exactly(fine[k] + (fine[k] - coarse[k]) / 3)));
+  if (e.none.empty()) {
+    const RodEstimate &worst = e.rods[e.worstRod()];
+    lines.push_back(text("estimated error: position ", worst.error, " m, ", worst.error / worst.length, " of the length of rod '", scene.rods[e.worstRod()].name, "' (vertex ",
+                         worst.vertex, ")"));
+    std::string line;
+    for (const auto &[name, member] : energies)
+      if (e.energy.*member != 0) line += (line.empty() ? "" : ", ") + text(name, " energy ", std::abs(e.energy_error.*member), " of ") + exactly(e.energy.*member) + " J";
+    if (!line.empty()) lines.push_back("estimated error: " + line);
+    if (e.tan) lines.push_back("measure tan: the estimate holds, but its series has more terms than that of measure angle, with which the extrapolated positions are closer");
+  } else
+    lines.push_back("no estimate: " + e.none);
+  for (std::size_t k = 0; k < e.critical.size(); ++k)
+    lines.push_back(text("estimated error: critical load factor ", e.critical_error[k], ", extrapolated ") + exactly(e.critical[k]));
+  if (!e.no_critical.empty()) lines.push_back("no estimate of critical load factors: " + e.no_critical);
   return lines;
 }
 
@@ -111,6 +156,10 @@ void writeEstimate(const std::string &path, const Estimate &e) {
   Hdf5File file = Hdf5File::reopen(path);
   file.createGroup("estimate");
   file.writeAttribute("estimate", "valid", int(e.none.empty()));
+  if (!e.critical.empty()) {
+    file.write("estimate/critical_load_factor", {e.critical.size()}, e.critical.data());
+    file.write("estimate/critical_error", {e.critical.size()}, e.critical_error.data());
+  }
   if (!e.none.empty()) return file.writeAttribute("estimate", "reason", e.none);
   const hsize_t n = e.position.size();
   file.write("estimate/position", {n, 3}, e.position[0].data());

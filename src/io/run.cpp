@@ -140,19 +140,12 @@ PetscErrorCode setUp(Prepared &prepared, Options &o) {
 }
 
 /// The error of a static answer, told and written.
-PetscErrorCode estimateError(const Prepared &prepared, const std::vector<double> &critical, const Options &o, Progress &progress) {
+PetscErrorCode tellError(const Prepared &prepared, const std::vector<double> &critical, const Options &o, Progress &progress) {
   PetscFunctionBeginUser;
   const Simulation &run = *prepared.run;
-  Answer coarse, fine;
-  PetscCall(solveStatics(redraw(prepared.written, prepared.drawings, edgesOf(run.scene, 2)), o.loop, &fine));
-  if (!fine.found) {
-    progress.say("no estimate: with half the edges' lengths, " + fine.failure);
-    PetscFunctionReturn(0);
-  }
-  coarse = {true, "", run.state.time, run.state.position, energyBudget(run.scene, *run.elements, run.state, run.state.time), critical};
-  const Estimate estimate = richardson(run.scene, coarse, fine);
+  Estimate estimate;
+  PetscCall(estimateError(run, critical, redraw(prepared.written, prepared.drawings, edgesOf(run.scene, 2)), o.loop, &estimate));
   for (const std::string &line : describe(estimate, run.scene)) progress.say(line);
-  for (const std::string &line : describeCritical(coarse.critical, fine.critical)) progress.say(line);
   writeEstimate(o.output_dir + "/trajectory.h5", estimate);
   PetscFunctionReturn(0);
 }
@@ -289,7 +282,7 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
   }
   writer.reset();
   if (finished && o.error_estimate && o.loop.dynamic) tellTimeError(last, o, progress);
-  if (finished && o.error_estimate && !o.loop.dynamic) PetscCall(estimateError(prepared, critical_factors, o, progress));
+  if (finished && o.error_estimate && !o.loop.dynamic) PetscCall(tellError(prepared, critical_factors, o, progress));
   PetscFunctionReturn(0);
 }
 
