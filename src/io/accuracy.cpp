@@ -12,7 +12,7 @@ constexpr int first_edges = 8;
 constexpr double largest_turning = 30 * pi / 180; ///< per vertex, at first [rad]
 constexpr double aim = 0.8, accept = 0.95;        ///< of the tolerance: an estimate is a few percent off itself
 constexpr int most_rounds = 8;
-constexpr double most_vertices = 1e6; ///< of all rods together
+constexpr double most_edges = 2e4; ///< of a rod: rounding grows with the fourth power of their number
 
 std::string text(double value) {
   std::ostringstream s;
@@ -82,9 +82,8 @@ PetscErrorCode chooseEdges(const Scene &scene, const std::vector<Drawing> &drawi
   }
   const std::string asked = "option -accuracy: an error of the " + nameOf(accuracy.of) + " below " + text(accuracy.tolerance);
   for (int round = 0; round < most_rounds; ++round) {
-    double vertices = 0;
-    for (const int n : edges) vertices += n;
-    if (vertices > most_vertices) throw SceneError(asked + " needs more than " + text(most_vertices) + " edges; write a larger tolerance");
+    if (*std::max_element(edges.begin(), edges.end()) > most_edges)
+      throw SceneError(asked + " needs more than " + text(most_edges) + " edges a rod, which rounding forbids; write a larger tolerance");
     Round found;
     PetscCall(estimateAt(scene, drawings, settings, edges, accuracy.of, &found));
     double worst = 0;
@@ -109,9 +108,11 @@ PetscErrorCode chooseEdges(const Scene &scene, const std::vector<Drawing> &drawi
         continue;
       }
       if (found.error[r] <= accept * accuracy.tolerance) continue;
+      const double factor = std::sqrt(found.error[r] / (aim * accuracy.tolerance));
+      if (edges[r] * factor > 10 * most_edges)
+        throw SceneError(asked + " needs about " + text(edges[r] * factor) + " edges of rod '" + scene.rods[r].name + "', more than rounding allows; write a larger tolerance");
       // A first estimate may be far off: not more than 16 times as many at once.
-      const double factor = std::min(std::sqrt(found.error[r] / (aim * accuracy.tolerance)), 16.0);
-      edges[r] = std::max(roundedUp(edges[r] * factor, multiple[r]), edges[r] + multiple[r]);
+      edges[r] = std::max(roundedUp(edges[r] * std::min(factor, 16.0), multiple[r]), edges[r] + multiple[r]);
     }
   }
   throw SceneError(asked + " was not reached: " + choice->lines.back().substr(std::string("accuracy: ").size()) + "; write a larger tolerance" +
