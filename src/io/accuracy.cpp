@@ -44,6 +44,22 @@ int firstEdges(const Rod &rod, const Drawing &drawing, int multiple) {
 
 std::string nameOf(Quantity q) { return q == Quantity::tip ? "tip" : q == Quantity::energy ? "energy" : "position"; }
 
+/// Rods of the same edges and errors, as copies are, share a line.
+void tellChoice(const Scene &scene, const Accuracy &accuracy, Choice &choice) {
+  constexpr std::size_t most_lines = 4;
+  std::map<std::pair<int, std::string>, int> alike;
+  std::vector<std::size_t> first; // of those alike
+  for (std::size_t r = 0; r < scene.rods.size(); ++r)
+    if (alike[{choice.edges[r], text(choice.error[r])}]++ == 0) first.push_back(r);
+  for (std::size_t k = 0; k < std::min(first.size(), most_lines); ++k) {
+    const std::size_t r = first[k];
+    const int others = alike[{choice.edges[r], text(choice.error[r])}] - 1;
+    choice.lines.push_back("accuracy: rod '" + scene.rods[r].name + "'" + (others > 0 ? " and " + std::to_string(others) + " like it" : "") + ": edges " + std::to_string(choice.edges[r]) + " for " +
+                           text(accuracy.tolerance) + ": estimated error of the " + nameOf(accuracy.of) + " " + text(choice.error[r]));
+  }
+  if (first.size() > most_lines) choice.lines.push_back("... and " + std::to_string(first.size() - most_lines) + " more kinds of rods; options.yaml has the edges of each");
+}
+
 /// What one round found.
 struct Round {
   std::vector<double> error; ///< per rod
@@ -93,11 +109,7 @@ PetscErrorCode chooseEdges(const Scene &scene, const std::vector<Drawing> &drawi
     if (found.none.empty() && worst <= accept * accuracy.tolerance) {
       choice->edges = edges;
       choice->error = found.error;
-      std::map<std::pair<int, double>, std::vector<std::size_t>> alike; // rods of the same edges and errors, as copies are
-      for (std::size_t r = 0; r < rods; ++r) alike[{edges[r], found.error[r]}].push_back(r);
-      for (const auto &[key, members] : alike)
-        choice->lines.push_back("accuracy: rod '" + scene.rods[members[0]].name + "'" + (members.size() > 1 ? " and " + std::to_string(members.size() - 1) + " like it" : "") + ": edges " +
-                                std::to_string(key.first) + " for " + text(accuracy.tolerance) + ": estimated error of the " + nameOf(accuracy.of) + " " + text(key.second));
+      tellChoice(scene, accuracy, *choice);
       PetscFunctionReturn(0);
     }
     choice->lines.push_back("accuracy: tried " + std::to_string(edges[where]) + " edges of rod '" + scene.rods[where].name + "': " +

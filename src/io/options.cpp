@@ -44,7 +44,7 @@ const std::vector<Entry> &entries() {
         {"checkpoint_interval", "steps between checkpoints; 0: only at the end", "0"},
         {"restart", "checkpoint of the same scene to go on from, to the same bits; the results go to another folder", "(none)"},
         {"output_fields", "fields of a frame besides the position: all for " + joined(TrajectoryWriter::fieldNames()) + "; by name also " + joined(TrajectoryWriter::derivedFieldNames()), "all"},
-        {"error_estimate", "true: statics are solved again with half the edge length, for an estimate of the error (docs/user.md); dynamics tell the error in time, where the integrator does", "false"},
+        {"error_estimate", "solve statics again with half the edge length and tell the estimated error; in dynamics tell that in time, where the integrator leaves it", "false"},
         {"accuracy", "largest relative error: chooses the edges of every rod so that the estimate is below (static)", "(edges from the scene)"},
         {"accuracy_of", "whose error: position (the largest, over the rod's length), tip (over the rod's length), or energy (elastic)", "position"},
         {"retraction", "how positions move: additive (straight), or length (keeping the linearised lengths of the edges)", "length"},
