@@ -54,10 +54,12 @@ void tellChoice(const Scene &scene, const Accuracy &accuracy, Choice &choice) {
   for (std::size_t k = 0; k < std::min(first.size(), most_lines); ++k) {
     const std::size_t r = first[k];
     const int others = alike[{choice.edges[r], text(choice.error[r])}] - 1;
-    choice.lines.push_back("accuracy: rod '" + scene.rods[r].name + "'" + (others > 0 ? " and " + std::to_string(others) + " like it" : "") + ": edges " + std::to_string(choice.edges[r]) + " for " +
-                           text(accuracy.tolerance) + ": estimated error of the " + nameOf(accuracy.of) + " " + text(choice.error[r]));
+    choice.lines.push_back("accuracy: rod '" + scene.rods[r].name + "'" + (others > 0 ? " and " + std::to_string(others) + " like it" : "") + ": edges " +
+                           std::to_string(choice.edges[r]) + " for " + text(accuracy.tolerance) + ": estimated error of the " + nameOf(accuracy.of) + " " +
+                           text(choice.error[r]));
   }
-  if (first.size() > most_lines) choice.lines.push_back("... and " + std::to_string(first.size() - most_lines) + " more kinds of rods; options.yaml has the edges of each");
+  if (first.size() > most_lines)
+    choice.lines.push_back("... and " + std::to_string(first.size() - most_lines) + " more kinds of rods; options.yaml has the edges of each");
 }
 
 /// What one round found.
@@ -66,7 +68,8 @@ struct Round {
   std::string none;          ///< why there is no estimate
 };
 
-PetscErrorCode estimateAt(const Scene &scene, const std::vector<Drawing> &drawings, const LoopSettings &settings, const std::vector<int> &edges, Quantity of, Round *round) {
+PetscErrorCode estimateAt(const Scene &scene, const std::vector<Drawing> &drawings, const LoopSettings &settings, const std::vector<int> &edges, Quantity of,
+                          Round *round) {
   PetscFunctionBeginUser;
   std::vector<int> twice = edges;
   for (int &n : twice) n *= 2;
@@ -82,7 +85,8 @@ PetscErrorCode estimateAt(const Scene &scene, const std::vector<Drawing> &drawin
   round->none = e.none;
   if (!e.none.empty()) PetscFunctionReturn(0);
   for (const RodEstimate &r : e.rods)
-    round->error.push_back(of == Quantity::energy ? (e.elasticError() > 0 ? e.elasticError() / e.elasticEnergy() : 0) : (of == Quantity::tip ? r.tip : r.error) / r.length);
+    round->error.push_back(of == Quantity::energy ? (e.elasticError() > 0 ? e.elasticError() / e.elasticEnergy() : 0)
+                                                  : (of == Quantity::tip ? r.tip : r.error) / r.length);
   PetscFunctionReturn(0);
 }
 
@@ -112,8 +116,8 @@ PetscErrorCode chooseEdges(const Scene &scene, const std::vector<Drawing> &drawi
       tellChoice(scene, accuracy, *choice);
       PetscFunctionReturn(0);
     }
-    choice->lines.push_back("accuracy: tried " + std::to_string(edges[where]) + " edges of rod '" + scene.rods[where].name + "': " +
-                            (found.none.empty() ? "estimated error of the " + nameOf(accuracy.of) + " " + text(worst) : found.none));
+    choice->lines.push_back("accuracy: tried " + std::to_string(edges[where]) + " edges of rod '" + scene.rods[where].name +
+                            "': " + (found.none.empty() ? "estimated error of the " + nameOf(accuracy.of) + " " + text(worst) : found.none));
     for (std::size_t r = 0; r < rods; ++r) {
       if (!found.none.empty()) {
         edges[r] *= 2;
@@ -122,7 +126,8 @@ PetscErrorCode chooseEdges(const Scene &scene, const std::vector<Drawing> &drawi
       if (found.error[r] <= accept * accuracy.tolerance) continue;
       const double factor = std::sqrt(found.error[r] / (aim * accuracy.tolerance));
       if (edges[r] * factor > 10 * most_edges)
-        throw SceneError(asked + " needs about " + text(edges[r] * factor) + " edges of rod '" + scene.rods[r].name + "', more than rounding allows; write a larger tolerance");
+        throw SceneError(asked + " needs about " + text(edges[r] * factor) + " edges of rod '" + scene.rods[r].name +
+                         "', more than rounding allows; write a larger tolerance");
       // A first estimate may be far off: not more than 16 times as many at once.
       edges[r] = std::max(roundedUp(edges[r] * std::min(factor, 16.0), multiple[r]), edges[r] + multiple[r]);
     }

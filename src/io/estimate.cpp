@@ -121,8 +121,9 @@ Estimate richardson(const Scene &scene, const Answer &coarse, const Answer &fine
       r.tip = error;
     }
     if (out.none.empty() && r.error > std::max(most_difference * r.displacement, least_difference * r.length))
-      out.none = text("rod '", rod.name, "' differs between ", rod.edges(), " and ", 2 * rod.edges(), " edges by ", r.error * 3 / 4, " m where its largest displacement is ",
-                      r.displacement, " m: the two answers are on different branches of equilibria, or the edges are too long");
+      out.none = text("rod '", rod.name, "' differs between ", rod.edges(), " and ", 2 * rod.edges(), " edges by ", r.error * 3 / 4,
+                      " m where its largest displacement is ", r.displacement,
+                      " m: the two answers are on different branches of equilibria, or the edges are too long");
     first += rod.vertices();
     fine_first += rod.vertices() + rod.edges();
   }
@@ -137,13 +138,16 @@ std::vector<std::string> describe(const Estimate &e, const Scene &scene) {
   std::vector<std::string> lines;
   if (e.none.empty()) {
     const RodEstimate &worst = e.rods[e.worstRod()];
-    lines.push_back(text("estimated error: position ", worst.error, " m, ", worst.error / worst.length, " of the length of rod '", scene.rods[e.worstRod()].name, "' (vertex ",
-                         worst.vertex, ")"));
+    lines.push_back(text("estimated error: position ", worst.error, " m, ", worst.error / worst.length, " of the length of rod '",
+                         scene.rods[e.worstRod()].name, "' (vertex ", worst.vertex, ")"));
     std::string line;
     for (const auto &[name, member] : energies)
-      if (e.energy.*member != 0) line += (line.empty() ? "" : ", ") + text(name, " energy ", std::abs(e.energy_error.*member), " of ") + exactly(e.energy.*member) + " J";
+      if (e.energy.*member != 0)
+        line += (line.empty() ? "" : ", ") + text(name, " energy ", std::abs(e.energy_error.*member), " of ") + exactly(e.energy.*member) + " J";
     if (!line.empty()) lines.push_back("estimated error: " + line);
-    if (e.tan) lines.push_back("measure tan: the estimate holds, but its series has more terms than that of measure angle, with which the extrapolated positions are closer");
+    if (e.tan)
+      lines.push_back(
+          "measure tan: the estimate holds, but its series has more terms than that of measure angle, with which the extrapolated positions are closer");
   } else
     lines.push_back("no estimate: " + e.none);
   for (std::size_t k = 0; k < e.critical.size(); ++k)

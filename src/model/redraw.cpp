@@ -60,7 +60,8 @@ Rod redrawn(const Rod &written, const Drawing &drawing, int edges) {
 int movedVertex(const Rod &written, int vertex, int edges) {
   const std::int64_t place = std::int64_t(vertex) * edges;
   if (place % written.edges() != 0)
-    throw SceneError("rod '" + written.name + "': its vertex " + std::to_string(vertex) + " of " + std::to_string(written.edges()) + " edges is no vertex of " + std::to_string(edges));
+    throw SceneError("rod '" + written.name + "': its vertex " + std::to_string(vertex) + " of " + std::to_string(written.edges()) + " edges is no vertex of " +
+                     std::to_string(edges));
   return int(place / written.edges());
 }
 

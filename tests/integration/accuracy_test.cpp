@@ -48,7 +48,7 @@ TEST(ErrorEstimate, IsTheErrorOfTheElastica) {
       const double error = (run.state.position.back() - exact).norm(), extrapolated = (e.position.back() - exact).norm();
       const bool clean = measure == Measure::angle;
       EXPECT_NEAR(e.error.back(), error, (clean ? 0.01 : 0.06) * error) << n; // of the next term in the series: h^4, or that of the boundary layer's
-      EXPECT_LT(extrapolated, error / 4 / (clean ? 100 : 2.5)) << n;         // error/4: that of the answer at h/2
+      EXPECT_LT(extrapolated, error / 4 / (clean ? 100 : 2.5)) << n;          // error/4: that of the answer at h/2
     }
 }
 

@@ -100,7 +100,7 @@ Vec3 tipUnderCouple(int edge, const Vec3 &couple, double torque, int factor) {
 }
 
 TEST(Redraw, CouplesGiveACleanSeries) {
-  for (const int edge : {0, 4, 8, 9}) // at the clamp, inside, by the end, and as an end couple
+  for (const int edge : {0, 4, 8, 9})        // at the clamp, inside, by the end, and as an end couple
     for (const double torque : {0.0, 0.5}) { // one by one: with both, Newton stops where its linear convergence lets it
       const Vec3 couple = torque == 0 ? Vec3(0.3, 0.8, 1) : Vec3::Zero();
       const Vec3 x1 = tipUnderCouple(edge, couple, torque, 1), x2 = tipUnderCouple(edge, couple, torque, 2), x4 = tipUnderCouple(edge, couple, torque, 4);

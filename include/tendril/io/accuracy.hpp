@@ -15,9 +15,9 @@ struct Accuracy {
 };
 
 struct Choice {
-  std::vector<int> edges;           ///< per rod
-  std::vector<double> error;        ///< estimated, per rod; of the energy that of all rods
-  std::vector<std::string> lines;   ///< what was tried and chosen, for the user
+  std::vector<int> edges;         ///< per rod
+  std::vector<double> error;      ///< estimated, per rod; of the energy that of all rods
+  std::vector<std::string> lines; ///< what was tried and chosen, for the user
 };
 
 /// Begins with 8 edges, or as many as make no vertex turn by more than 30 degrees, predicts from the second order of the error how many are needed,

@@ -38,9 +38,9 @@ struct Estimate {
   std::vector<Vec3> position; ///< extrapolated, of the vertices at h (nv) [m]
   std::vector<double> error;  ///< of the answer at h (nv) [m]
   std::vector<RodEstimate> rods;
-  EnergyBudget energy, energy_error; ///< at h, signed: the energy less its error is the extrapolated energy [J]
-  bool tan = false;                  ///< some rod measures strains by tan
-  std::string none;                  ///< why the two answers tell nothing; empty when they do
+  EnergyBudget energy, energy_error;            ///< at h, signed: the energy less its error is the extrapolated energy [J]
+  bool tan = false;                             ///< some rod measures strains by tan
+  std::string none;                             ///< why the two answers tell nothing; empty when they do
   std::vector<double> critical, critical_error; ///< extrapolated critical load factors, and the errors of those found
   std::string no_critical;                      ///< why there is no estimate of them although some were found
 
