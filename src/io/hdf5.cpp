@@ -16,6 +16,30 @@ template <class Id> Id checked(Id id, const std::string &what) {
   return id;
 }
 
+void attach(hid_t to, const std::string &name, const std::string &value) {
+  const Hdf5Type type = H5Tcopy(H5T_C_S1);
+  H5Tset_size(type, std::max<std::size_t>(value.size(), 1));
+  H5Tset_cset(type, H5T_CSET_UTF8);
+  const Hdf5Space space = H5Screate(H5S_SCALAR);
+  const Hdf5Attribute a = H5Acreate2(to, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT);
+  H5Awrite(a, type, value.c_str());
+}
+
+void attach(hid_t to, const std::string &name, const std::vector<double> &values) {
+  const hsize_t size = values.size();
+  const Hdf5Space space = H5Screate_simple(1, &size, nullptr);
+  const Hdf5Attribute a = H5Acreate2(to, name.c_str(), H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT);
+  H5Awrite(a, H5T_NATIVE_DOUBLE, values.data());
+}
+
+template <class Number> void attachScalar(hid_t to, const std::string &name, Number value, hid_t stored, hid_t native) {
+  const Hdf5Space space = H5Screate(H5S_SCALAR);
+  const Hdf5Attribute a = H5Acreate2(to, name.c_str(), stored, space, H5P_DEFAULT, H5P_DEFAULT);
+  H5Awrite(a, native, &value);
+}
+void attach(hid_t to, const std::string &name, double value) { attachScalar(to, name, value, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE); }
+void attach(hid_t to, const std::string &name, int value) { attachScalar(to, name, value, H5T_STD_I32LE, H5T_NATIVE_INT); }
+
 } // namespace
 
 Hdf5File Hdf5File::open(const std::string &path) {
@@ -33,6 +57,13 @@ Hdf5File Hdf5File::create(const std::string &path) {
   Hdf5Properties access = H5Pcreate(H5P_FILE_ACCESS);
   H5Pset_libver_bounds(access, H5F_LIBVER_LATEST, H5F_LIBVER_LATEST); // what appending under readers needs
   f.file_ = checked(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access), path + ": cannot be written; is another run using it?");
+  return f;
+}
+
+Hdf5File Hdf5File::reopen(const std::string &path) {
+  Hdf5File f;
+  f.path_ = path;
+  f.file_ = checked(H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT), path + ": cannot be opened again; is another program using it?");
   return f;
 }
 
@@ -74,27 +105,15 @@ void Hdf5File::write(const std::string &name, const std::vector<hsize_t> &shape,
   checked(H5Dwrite(data, H5T_NATIVE_INT, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), path_ + ": cannot be written");
 }
 
-void Hdf5File::writeAttribute(const std::string &name, const std::string &value) {
-  const Hdf5Type type = H5Tcopy(H5T_C_S1);
-  H5Tset_size(type, std::max<std::size_t>(value.size(), 1));
-  H5Tset_cset(type, H5T_CSET_UTF8);
-  const Hdf5Space space = H5Screate(H5S_SCALAR);
-  const Hdf5Attribute a = H5Acreate2(file_, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT);
-  H5Awrite(a, type, value.c_str());
-}
+void Hdf5File::writeAttribute(const std::string &name, const std::string &value) { attach(file_, name, value); }
+void Hdf5File::writeAttribute(const std::string &name, const std::vector<double> &values) { attach(file_, name, values); }
+void Hdf5File::writeAttribute(const std::string &name, int value) { attach(file_, name, value); }
 
-void Hdf5File::writeAttribute(const std::string &name, const std::vector<double> &values) {
-  const hsize_t size = values.size();
-  const Hdf5Space space = H5Screate_simple(1, &size, nullptr);
-  const Hdf5Attribute a = H5Acreate2(file_, name.c_str(), H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT);
-  H5Awrite(a, H5T_NATIVE_DOUBLE, values.data());
-}
+void Hdf5File::writeAttribute(const std::string &group, const std::string &name, const std::string &value) { attach(groupAt(group), name, value); }
+void Hdf5File::writeAttribute(const std::string &group, const std::string &name, double value) { attach(groupAt(group), name, value); }
+void Hdf5File::writeAttribute(const std::string &group, const std::string &name, int value) { attach(groupAt(group), name, value); }
 
-void Hdf5File::writeAttribute(const std::string &name, int value) {
-  const Hdf5Space space = H5Screate(H5S_SCALAR);
-  const Hdf5Attribute a = H5Acreate2(file_, name.c_str(), H5T_STD_I32LE, space, H5P_DEFAULT, H5P_DEFAULT);
-  H5Awrite(a, H5T_NATIVE_INT, &value);
-}
+Hdf5Group Hdf5File::groupAt(const std::string &name) const { return checked(H5Gopen2(file_, name.c_str(), H5P_DEFAULT), path_ + ": has no group '" + name + "'"); }
 
 Hdf5Series::Hdf5Series(const Hdf5File &file, const std::string &name, const std::vector<hsize_t> &slab, bool integer) : extent_(slab) {
   extent_.insert(extent_.begin(), 0);

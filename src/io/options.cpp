@@ -44,6 +44,9 @@ const std::vector<Entry> &entries() {
         {"checkpoint_interval", "steps between checkpoints; 0: only at the end", "0"},
         {"restart", "checkpoint of the same scene to go on from, to the same bits; the results go to another folder", "(none)"},
         {"output_fields", "fields of a frame besides the position: all for " + joined(TrajectoryWriter::fieldNames()) + "; by name also " + joined(TrajectoryWriter::derivedFieldNames()), "all"},
+        {"error_estimate", "solve statics again with half the edge length and tell the estimated error; in dynamics tell that in time, where the integrator leaves it", "false"},
+        {"accuracy", "largest relative error: chooses the edges of every rod so that the estimate is below (static)", "(edges from the scene)"},
+        {"accuracy_of", "whose error: position (the largest, over the rod's length), tip (over the rod's length), or energy (elastic)", "position"},
         {"retraction", "how positions move: additive (straight), or length (keeping the linearised lengths of the edges)", "length"},
         {"stretch", "axial force: primal (from the strain), or mixed (an unknown of its own)", "mixed"},
         {"hessian", "exact, or gauss_newton (without second derivatives of the strains; for comparison)", "exact"},
@@ -70,12 +73,19 @@ public:
     }
     PetscOptionsEnd();
     for (const auto &[name, text_given] : given_)
-      if (text_given.empty()) fail(name, "needs a value");
+      if (text_given.empty() && name != "error_estimate") fail(name, "needs a value");
     PetscFunctionReturn(0);
   }
 
   bool has(const std::string &name) const { return given_.count(name) > 0; }
   const std::string &at(const std::string &name) const { return given_.at(name); }
+
+  /// Given alone, it is true.
+  bool flag(const std::string &name) const {
+    if (at(name).empty()) return true;
+    const std::string word = oneOf(name, {"true", "false", "1", "0"});
+    return word == "true" || word == "1";
+  }
 
   double number(const std::string &name) const {
     const std::vector<double> v = numbers(name);
@@ -184,6 +194,15 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   }
   if (texts.has("restart")) o->restart = texts.at("restart");
   o->fields = readFields(texts);
+  if (texts.has("error_estimate")) o->error_estimate = texts.flag("error_estimate");
+  if (texts.has("accuracy_of")) {
+    const std::string q = texts.oneOf("accuracy_of", {"position", "tip", "energy"});
+    o->accuracy_of = q == "tip" ? Quantity::tip : q == "energy" ? Quantity::energy : Quantity::position;
+  }
+  if (texts.has("accuracy")) {
+    o->accuracy = {texts.positive("accuracy"), o->accuracy_of.value_or(Quantity::position)};
+    if (o->accuracy->tolerance >= 1) fail("accuracy", "is relative and must be below 1, e.g. 1e-3; found '" + texts.at("accuracy") + "'");
+  }
   if (texts.has("retraction"))
     o->loop.retraction = texts.oneOf("retraction", {"additive", "length"}) == "additive" ? RetractionKind::additive : RetractionKind::length;
   if (texts.has("stretch")) o->loop.mixed = texts.oneOf("stretch", {"primal", "mixed"}) == "mixed";
@@ -195,6 +214,21 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   if (!(rtol > 0 && rtol <= 1)) fail("snes_rtol", "must be above 0 and at most 1: it is relative to the loads of each rod");
   PetscFunctionReturn(0);
 }
+
+namespace {
+
+/// Of estimates and the choice of edges.
+void checkAccuracy(const Options &o) {
+  if (o.accuracy_of && !o.accuracy) fail("accuracy_of", "needs -accuracy, e.g. -accuracy 1e-3");
+  if (o.loop.dynamic && o.accuracy)
+    fail("accuracy", "chooses edges in -mode static only; in dynamics the step counts as well: compare with a run of half the -dt and twice the edges");
+  if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength && (o.accuracy || o.error_estimate))
+    fail(o.accuracy ? "accuracy" : "error_estimate", "needs -continuation load: paths of two resolutions have no states in common");
+  if (o.accuracy && o.loop.bifurcation == Bifurcation::stop) fail("accuracy", "is that of the answer at full load; -bifurcation stop ends before");
+  if (o.accuracy && !o.restart.empty()) fail("accuracy", "chooses the edges, which a checkpoint already has; take -restart or -accuracy away");
+}
+
+} // namespace
 
 void resolve(const RunSettings &scene, Options &o) {
   o.loop.dynamic = o.mode.value_or(scene.mode) == "dynamic";
@@ -219,6 +253,7 @@ void resolve(const RunSettings &scene, Options &o) {
     if (o.arclength_steps && !arclength) fail("arclength_steps", "needs -continuation arclength");
     if (o.bifurcation && arclength) fail("bifurcation", "belongs to -continuation load; along the arc length, negative_pivots in the diagnostics tells stability");
   }
+  checkAccuracy(o);
   if (o.loop.dt_min > o.loop.dt) fail("dt_min", "must not be larger than the step " + std::to_string(o.loop.dt));
 }
 
@@ -275,6 +310,11 @@ void writeOptionsFile(const std::string &path, const Options &o, const Provenanc
   if (!o.restart.empty()) put("restart", o.restart);
   out << YAML::Key << "output_fields" << YAML::Value;
   list(o.fields.begin(), o.fields.end());
+  put("error_estimate", o.error_estimate);
+  if (o.accuracy) {
+    put("accuracy", o.accuracy->tolerance);
+    put("accuracy_of", o.accuracy->of == Quantity::tip ? "tip" : o.accuracy->of == Quantity::energy ? "energy" : "position");
+  }
   put("retraction", o.loop.retraction == RetractionKind::length ? "length" : "additive");
   put("stretch", o.loop.mixed ? "mixed" : "primal");
   put("hessian", o.loop.hessian == HessianKind::exact ? "exact" : "gauss_newton");
@@ -283,6 +323,7 @@ void writeOptionsFile(const std::string &path, const Options &o, const Provenanc
     const Material &m = rod.material;
     out << YAML::BeginMap;
     put("name", rod.name);
+    put("edges", rod.edges());
     put("measure", rod.measure == Measure::tan ? "tan" : "angle");
     put("linear_density", m.linear_density);
     put("linear_rotational_inertia", m.linear_rotational_inertia);

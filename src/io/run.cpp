@@ -102,7 +102,22 @@ void requireHeld(const Scene &scene) {
   }
 }
 
-PetscErrorCode setUp(Simulation &run, Options &o) {
+/// A scene ready to run; and as written, when it may have to be drawn again.
+struct Prepared {
+  std::unique_ptr<Simulation> run;
+  Scene written;
+  std::vector<Drawing> drawings;
+};
+
+PetscErrorCode makeReady(Scene scene, const Options &o, std::unique_ptr<Simulation> &run) {
+  PetscFunctionBeginUser;
+  run = std::make_unique<Simulation>();
+  PetscCall(run->setUp(std::move(scene), o.loop));
+  PetscCall(run->solver.rehearse(run->state, TimeLoop::stepOf(o.loop, run->state, o.loop.dt)));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode setUp(Prepared &prepared, Options &o) {
   PetscFunctionBeginUser;
   PetscCall(PetscLogStagePush(events().setup));
   SceneFile file = readScene(o.scene, o.overrides);
@@ -112,10 +127,36 @@ PetscErrorCode setUp(Simulation &run, Options &o) {
   if (o.bifurcation && o.loop.bifurcation != Bifurcation::off && !file.scene.moments.empty())
     throw SceneError("option -bifurcation: a scene with couples has no potential whose Hessian could tell stability; use off");
   if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength) requireDeadLoads(file.scene);
-  PetscCall(run.setUp(std::move(file.scene), o.loop));
-  PetscCall(run.solver.rehearse(run.state, TimeLoop::stepOf(o.loop, run.state, o.loop.dt)));
+  if (o.accuracy && o.accuracy->of == Quantity::tip)
+    for (const Rod &rod : file.scene.rods)
+      if (rod.closed) throw SceneError("option -accuracy_of: rod '" + rod.name + "' is closed and has no tip; use position");
+  if (o.accuracy || (o.error_estimate && !o.loop.dynamic)) {
+    prepared.written = file.scene;
+    prepared.drawings = std::move(file.drawings);
+  }
+  PetscCall(makeReady(std::move(file.scene), o, prepared.run));
   PetscCall(PetscLogStagePop());
   PetscFunctionReturn(0);
+}
+
+/// The error of a static answer, told and written.
+PetscErrorCode tellError(const Prepared &prepared, const std::vector<double> &critical, const Options &o, Progress &progress) {
+  PetscFunctionBeginUser;
+  const Simulation &run = *prepared.run;
+  Estimate estimate;
+  PetscCall(estimateError(run, critical, redraw(prepared.written, prepared.drawings, edgesOf(run.scene, 2)), o.loop, &estimate));
+  for (const std::string &line : describe(estimate, run.scene)) progress.say(line);
+  writeEstimate(o.output_dir + "/trajectory.h5", estimate);
+  PetscFunctionReturn(0);
+}
+
+void tellTimeError(const Diagnostics &last, const Options &o, Progress &progress) {
+  const std::optional<double> error = accumulatedTimeError(last);
+  if (!error) return progress.say("no estimate: the diagnostics have no column error_estimate, in which an integrator leaves its error in time");
+  std::ostringstream line;
+  line << "estimated error: " << std::setprecision(3) << *error << " in time, the local errors of all steps added up; that of the edges is not in it";
+  progress.say(line.str());
+  writeTimeError(o.output_dir + "/trajectory.h5", *error);
 }
 
 PetscErrorCode execute(int argc, char **argv, int *exit_code) {
@@ -132,13 +173,20 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
   int ranks;
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &ranks));
   if (ranks > 1) throw SceneError("tendril runs on one process, found " + std::to_string(ranks) + "; start it without mpiexec");
-  Simulation run;
+  Prepared prepared;
   {
     const QuietErrors errors;
-    if (setUp(run, o)) throw SceneError("setting up the solvers: " + errors.message());
+    if (setUp(prepared, o)) throw SceneError("setting up the solvers: " + errors.message());
   }
   if (o.help) PetscFunctionReturn(0);
   PetscCall(refuseUnknownOptions());
+  makeFolder(o.output_dir);
+  Choice choice;
+  if (o.accuracy) {
+    PetscCall(chooseEdges(prepared.written, prepared.drawings, o.loop, *o.accuracy, &choice));
+    PetscCall(makeReady(redraw(prepared.written, prepared.drawings, choice.edges), o, prepared.run));
+  }
+  Simulation &run = *prepared.run;
   TimeLoop loop(run.solver, o.loop);
   if (!o.restart.empty()) {
     if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength) throw SceneError("option -restart: -continuation arclength cannot be taken up again");
@@ -149,7 +197,6 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
     if (!(run.state.time < o.loop.t_end))
       throw SceneError("option -restart: the checkpoint is at time " + std::to_string(run.state.time) + ", nothing is left to do; write a larger -t_end");
   }
-  makeFolder(o.output_dir);
   const Provenance origin = provenance(argc, argv);
   writeOptionsFile(o.output_dir + "/options.yaml", o, origin, run.scene);
   Progress progress(o.loop.t_end, o.output_dir + "/log.txt");
@@ -157,13 +204,17 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
   std::istringstream groups(groupsText(run.scene));
   for (std::string line; std::getline(groups, line);) progress.say(line);
 
-  TrajectoryWriter trajectory(o.output_dir, run.scene, *run.elements, origin, o.fields, o.loop.dynamic);
+  for (const std::string &line : choice.lines) progress.say(line);
+
+  auto writer = std::make_unique<TrajectoryWriter>(o.output_dir, run.scene, *run.elements, origin, o.fields, o.loop.dynamic);
+  TrajectoryWriter &trajectory = *writer;
   trajectory.writeFrame(run.state);
   trajectory.flushWhenDue();
+  Diagnostics last;
+  std::vector<double> critical_factors;
   double next_output = o.output_interval > 0 ? o.output_interval * (1 + std::floor(run.state.time / o.output_interval * (1 + 1e-12))) : 0;
   const std::string checkpoint = o.output_dir + "/checkpoint.h5";
   long steps = 0, iterations = 0, rejected = 0;
-  double wall = 0;
   bool warned = false;
   const bool arclength = !o.loop.dynamic && o.loop.continuation == Continuation::arclength;
   auto observe = [&](const State &state, const Diagnostics &row) -> PetscErrorCode {
@@ -172,7 +223,7 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
     ++steps;
     iterations += row.newton_iterations;
     rejected += row.rejected_steps;
-    wall = row.wall_seconds;
+    last = row;
     trajectory.writeDiagnostics(row);
     if (arclength || state.time >= next_output * (1 - 1e-12) || state.time >= o.loop.t_end) {
       trajectory.writeFrame(state);
@@ -197,6 +248,7 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
     std::ostringstream line;
     line << (point.limit ? "limit point: " : "") << "critical load factor " << std::setprecision(10) << point.load_factor;
     progress.say(line.str());
+    critical_factors.push_back(point.load_factor);
     trajectory.writeCritical(point.load_factor);
     trajectory.writeFrame(*point.state);
     trajectory.flush();
@@ -221,13 +273,16 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
   PetscCall(PetscLogStagePop());
   std::ostringstream summary;
   summary << steps << " steps, " << iterations << " Newton iterations (mean " << std::setprecision(3) << (steps ? double(iterations) / double(steps) : 0) << "), " << rejected
-          << " rejected, " << wall << " s, results in " << o.output_dir;
+          << " rejected, " << last.wall_seconds << " s, results in " << o.output_dir;
   progress.say(summary.str());
   if (!finished) {
     progress.say("failed: " + failure);
     std::fprintf(stderr, "tendril: %s\n", failure.c_str());
     *exit_code = 2;
   }
+  writer.reset();
+  if (finished && o.error_estimate && o.loop.dynamic) tellTimeError(last, o, progress);
+  if (finished && o.error_estimate && !o.loop.dynamic) PetscCall(tellError(prepared, critical_factors, o, progress));
   PetscFunctionReturn(0);
 }
 

@@ -122,7 +122,7 @@ std::string readName(YamlMap &map, const std::vector<Rod> &rods) {
   return name;
 }
 
-void readRod(const YamlValue &value, const Overrides &overrides, std::vector<Rod> &rods) {
+void readRod(const YamlValue &value, const Overrides &overrides, std::vector<Rod> &rods, std::vector<Drawing> &drawings) {
   YamlMap map(value);
   const std::string name = readName(map, rods);
   const std::vector<Polyline> shapes = readShape(map);
@@ -175,6 +175,10 @@ void readRod(const YamlValue &value, const Overrides &overrides, std::vector<Rod
         map.at("turns").fail("'turns' of a closed rod must be a whole number, or its ends do not meet");
       if (rod.material.isCable() && rod.initial_turns != 0) map.at("turns").fail("a rod without flexural stiffness has no twist");
       rods.push_back(rod);
+      Drawing &drawing = drawings.emplace_back();
+      drawing.directors_given = map.has("directors");
+      if (rod.closed == shapes[k].closed && shapes[k].curve) // a curve that `closed` closes by one more edge is points to us
+        drawing.curve = [curve = shapes[k].curve, shift = Vec3(double(copy) * offset)](double s) { return Vec3(curve(s) + shift); };
     }
   map.finish();
 }
@@ -241,9 +245,11 @@ void readSupport(const YamlValue &value, Scene &scene) {
         value.fail("vertex " + std::to_string(s.vertex) + " of rod '" + rod.name + "' is held twice");
     s.frame = frameAtVertex(rod, s.vertex);
     if (type != "pin") {
-      if (map.has("tangent")) s.frame.tangent = unit(map.at("tangent"));
+      s.tangent_given = map.has("tangent");
+      s.director_given = map.has("director");
+      if (s.tangent_given) s.frame.tangent = unit(map.at("tangent"));
       s.frame.director = orthonormalised(s.frame.director, s.frame.tangent);
-      if (map.has("director")) {
+      if (s.director_given) {
         const YamlValue d = map.at("director");
         const Vec3 v = unit(d);
         if (std::abs(v.dot(s.frame.tangent)) > 1e-6) d.fail("'director' is not normal to the tangent of the support");
@@ -314,7 +320,7 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
   YamlMap map(YamlValue(root, path, "scene"));
   out.scene.gravity = map.vector("gravity", Vec3(0, -9.81, 0));
   if (map.has("simulation")) readRun(map.at("simulation"), out.run);
-  for (const YamlValue &v : map.at("rods").items()) readRod(v, overrides, out.scene.rods);
+  for (const YamlValue &v : map.at("rods").items()) readRod(v, overrides, out.scene.rods, out.drawings);
   if (out.scene.rods.empty()) map.at("rods").fail("a scene needs at least one rod");
   if (map.has("supports"))
     for (const YamlValue &v : map.at("supports").items()) readSupport(v, out.scene);

@@ -238,6 +238,20 @@ rows = [
     ("steps along the path for load steps", None, ["-mode", "static", "-arclength_steps", "5"], ["-arclength_steps", "-continuation arclength"]),
     ("path without a load", None, ["-mode", "static", "-continuation", "arclength", "-gravity", "0,0,0"], ["needs a load"]),
     ("path of a moving support", ("type: clamp}", "type: clamp, motion: {velocity: [1, 0, 0]}}"), ["-mode", "static", "-continuation", "arclength"], ["moves", "-continuation load"]),
+    ("estimate that is a word", None, ["-error_estimate", "maybe"], ["-error_estimate", "true, false"]),
+    ("estimate along a path", None, ["-mode", "static", "-continuation", "arclength", "-error_estimate"], ["-error_estimate", "-continuation load"]),
+    ("accuracy in dynamics", None, ["-accuracy", "1e-3"], ["-accuracy", "-mode static", "-dt"]),
+    ("accuracy that is a word", None, ["-mode", "static", "-accuracy", "high"], ["-accuracy", "'high' is not a number"]),
+    ("accuracy of nothing", None, ["-mode", "static", "-accuracy", "0"], ["-accuracy", "greater than zero"]),
+    ("accuracy in percent", None, ["-mode", "static", "-accuracy", "5"], ["-accuracy", "below 1", "'5'"]),
+    ("accuracy without a value", None, ["-mode", "static", "-accuracy"], ["-accuracy", "needs a value"]),
+    ("accuracy out of reach", None, ["-mode", "static", "-accuracy", "1e-15"], ["-accuracy", "larger tolerance"]),
+    ("accuracy of what", None, ["-mode", "static", "-accuracy", "1e-3", "-accuracy_of", "tp"], ["-accuracy_of", "position, tip, energy", "did you mean 'tip'"]),
+    ("accuracy of a quantity without a tolerance", None, ["-mode", "static", "-accuracy_of", "tip"], ["-accuracy_of", "needs -accuracy"]),
+    ("tip of a ring", (shape, "ring: {radius: 0.5, edges: 16}"), ["-mode", "static", "-accuracy", "1e-3", "-accuracy_of", "tip"], ["-accuracy_of", "'a' is closed", "position"]),
+    ("accuracy at a critical load", None, ["-mode", "static", "-accuracy", "1e-3", "-bifurcation", "stop"], ["-accuracy", "-bifurcation stop"]),
+    ("accuracy along a path", None, ["-mode", "static", "-accuracy", "1e-3", "-continuation", "arclength"], ["-accuracy", "-continuation load"]),
+    ("accuracy of a restart", None, ["-mode", "static", "-accuracy", "1e-3", "-restart", "file"], ["-accuracy", "-restart"]),
     ("free rod in statics", ("supports:\n  - {vertex: 0, type: clamp}\n", ""), ["-mode", "static"], ["free to move"]),
 ]
 
@@ -274,7 +288,7 @@ failures = len(complaints)
 for complaint in complaints:
     print(complaint)
 help_text = subprocess.run([program, "-help"], capture_output=True, text=True)
-for option in "scene mode dt dt_min t_end load_steps continuation bifurcation arclength_steps gravity output_dir output_interval output_fields retraction stretch rod_young rod_measure".split():
+for option in "scene mode dt dt_min t_end load_steps continuation bifurcation arclength_steps gravity output_dir output_interval output_fields error_estimate accuracy accuracy_of retraction stretch rod_young rod_measure".split():
     if f"-{option}" not in help_text.stdout or help_text.returncode != 0:
         failures += 1
         print("-help does not list", option)

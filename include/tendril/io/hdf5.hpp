@@ -40,6 +40,8 @@ public:
   static Hdf5File open(const std::string &path);
   /// A new file whose datasets only grow; every flush leaves it readable (HDF5's single writer, multiple readers). \throws SceneError
   static Hdf5File create(const std::string &path);
+  /// A file that is complete, to add to it. \throws SceneError
+  static Hdf5File reopen(const std::string &path);
   /// No datasets may be created afterwards.
   void startAppending();
 
@@ -53,11 +55,17 @@ public:
   void writeAttribute(const std::string &name, const std::string &value);
   void writeAttribute(const std::string &name, const std::vector<double> &values);
   void writeAttribute(const std::string &name, int value);
+  /// Of a group.
+  void writeAttribute(const std::string &group, const std::string &name, const std::string &value);
+  void writeAttribute(const std::string &group, const std::string &name, double value);
+  void writeAttribute(const std::string &group, const std::string &name, int value);
   hid_t id() const { return file_; }
 
 private:
   Hdf5Handle<H5Fclose> file_;
   std::string path_;
+
+  Hdf5Group groupAt(const std::string &name) const;
 };
 
 /// A dataset that grows by one slab per append: shape (n, slab...). Small slabs wait in memory until flush() and are then written at once; large

@@ -3,9 +3,9 @@
 /// The command line: options of our own, listed by -help and read as text, so that a mistake is told in one line.
 
 #include "tendril/dynamics/time_loop.hpp"
+#include "tendril/io/accuracy.hpp"
 #include "tendril/io/scene_reader.hpp"
 
-#include <optional>
 #include <set>
 
 namespace tendril {
@@ -28,6 +28,9 @@ struct Options {
   int checkpoint_interval = 0; ///< steps; 0: only at the end
   std::string restart;         ///< checkpoint to go on from, or empty
   std::set<std::string> fields;
+  bool error_estimate = false;
+  std::optional<Accuracy> accuracy;
+  std::optional<Quantity> accuracy_of; ///< as given
 };
 
 /// Reads our options from PETSc's data base. \throws SceneError naming the option.

@@ -4,14 +4,19 @@
 
 #include "tendril/geometry/scalar.hpp"
 
+#include <functional>
 #include <string>
 #include <vector>
 
 namespace tendril {
 
+/// A curve over [0, 1]: vertex i of a polyline of n edges along it stands at i/n.
+using Curve = std::function<Vec3(double)>;
+
 struct Polyline {
   std::vector<Vec3> points; ///< [m]; the first is not repeated at the end of a closed one
   bool closed = false;
+  Curve curve; ///< that the points were taken from; empty where there are only points
 };
 
 /// Reads all polylines of a file, by its extension:

@@ -3,6 +3,7 @@
 /// Scenes from YAML. docs/user.md describes every key.
 
 #include "tendril/io/material_reader.hpp"
+#include "tendril/model/redraw.hpp"
 
 namespace tendril {
 
@@ -16,6 +17,7 @@ struct RunSettings {
 
 struct SceneFile {
   Scene scene;
+  std::vector<Drawing> drawings; ///< per rod
   RunSettings run;
 };
 

@@ -66,6 +66,7 @@ struct Support {
   int rod, vertex;
   Motion motion;
   Frame frame; ///< reference frame at the vertex (clamp, fix_twist); length 1
+  bool tangent_given = false, director_given = false; ///< by the scene; otherwise the frame is that of the rod as drawn
 
   bool holdsPosition() const { return kind != Kind::fix_twist; }
   bool holdsTwist() const { return kind != Kind::pin; }

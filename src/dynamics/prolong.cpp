@@ -1,0 +1,99 @@
+#include "tendril/dynamics/prolong.hpp"
+
+#include "tendril/model/redraw.hpp"
+
+#include <algorithm>
+
+namespace tendril {
+namespace {
+
+/// Twist per length on either half of each edge of a rod, from the cells at its ends [rad/m].
+struct TwistRates {
+  std::vector<double> before, after;
+};
+
+/// Edge of a rod at a slot, or -1 where a support's frame is.
+int edgeAt(const RodRange &rod, int slot) {
+  const int i = slot - rod.first_slot;
+  if (i >= 0 && i < rod.edges) return i;
+  return rod.closed && i == rod.edges ? 0 : -1;
+}
+
+/// Cells of a rod one by one, those of half edges too.
+std::vector<LooseCell> cellsOf(const Elements &elements, int r) {
+  std::vector<LooseCell> cells = elements.loose[r];
+  for (int s = elements.cell_begin[r]; s < elements.cell_end[r]; ++s)
+    if (elements.cellLength()[s] > 0) cells.push_back({s, s - 1, s, s}); // none where a clamp cuts the rod
+  return cells;
+}
+
+TwistRates twistRates(const Elements &elements, const Configuration &c, int r) {
+  const RodRange &rod = elements.rods[r];
+  const double none = std::nan("");
+  TwistRates rates{std::vector<double>(rod.edges, none), std::vector<double>(rod.edges, none)};
+  for (const LooseCell &cell : cellsOf(elements, r)) {
+    const double rate = c[Configuration::twist][cell.slot] / elements.cellLength()[cell.slot];
+    if (const int e = edgeAt(rod, cell.frame0); e >= 0) rates.after[e] = rate;
+    if (const int e = edgeAt(rod, cell.frame1); e >= 0) rates.before[e] = rate;
+  }
+  for (int e = 0; e < rod.edges; ++e) { // free ends have no cell
+    if (std::isnan(rates.before[e])) rates.before[e] = std::isnan(rates.after[e]) ? 0 : rates.after[e];
+    if (std::isnan(rates.after[e])) rates.after[e] = rates.before[e];
+  }
+  return rates;
+}
+
+/// Whole turns of the fine cells: those that bring the twist of their frames closest to the coarse one.
+void setTurns(const std::vector<TwistRates> &rates, const Scene &fine, const Elements &elements, State &state) {
+  const Configuration c = configurationOf(state, fine, elements, state.time);
+  for (int r = 0; r < int(fine.rods.size()); ++r) {
+    if (fine.rods[r].measure != Measure::angle) continue;
+    const auto &[before, after] = rates[r];
+    auto middle = [&](int edge) { return 0.5 * (before[edge] + after[edge]); };
+    const std::vector<LooseCell> &loose = elements.loose[r];
+    for (int n = elements.rod_cells[r]; n < elements.rod_cells[r + 1]; ++n) {
+      const int slot = elements.cell_slot[n];
+      const auto held = std::find_if(loose.begin(), loose.end(), [&](const LooseCell &one) { return one.slot == slot; });
+      const LooseCell cell = held != loose.end() ? *held : LooseCell{slot, slot - 1, slot, slot};
+      const int j = edgeAt(elements.rods[r], cell.frame0), k = edgeAt(elements.rods[r], cell.frame1);
+      const double rate = j >= 0 ? (j % 2 == 0 ? middle(j / 2) : after[j / 2]) : k % 2 == 0 ? before[k / 2] : middle(k / 2);
+      state.turns[n] = 2 * pi * std::round((rate * elements.cellLength()[slot] - c[Configuration::twist][slot]) / (2 * pi));
+    }
+  }
+}
+
+} // namespace
+
+State prolonged(const State &state, const Scene &scene, const Elements &elements, const Scene &fine, const Elements &fine_elements) {
+  State out;
+  out.time = state.time;
+  out.step = state.step;
+  const Configuration c = configurationOf(state, scene, elements, state.time);
+  std::vector<TwistRates> rates;
+  for (int r = 0; r < int(scene.rods.size()); ++r) {
+    const RodRange &range = elements.rods[r];
+    rates.push_back(range.twist ? twistRates(elements, c, r) : TwistRates{std::vector<double>(range.edges, 0.0), std::vector<double>(range.edges, 0.0)});
+    Rod present = scene.rods[r];
+    std::copy_n(state.position.begin() + range.first_vertex, range.vertices, present.position.begin());
+    const Curve curve = curveThrough(present);
+    present.position.clear();
+    for (int i = 0; i < fine.rods[r].vertices(); ++i) present.position.push_back(curve(0.5 * i / range.edges));
+    out.position.insert(out.position.end(), present.position.begin(), present.position.end());
+    for (int i = 0; i < range.edges; ++i) {
+      const Frame f = c.frameAt(range.slot(i));
+      const double quarter = 0.25 * elements.restLength()[range.slot(i)];
+      for (const auto &[child, turn] : {std::pair(2 * i, -quarter * rates[r].before[i]), std::pair(2 * i + 1, quarter * rates[r].after[i])}) {
+        const Vec3 t = present.edge(child).normalized();
+        out.director.push_back(orthonormalised(rotateAbout<double>(transport<double>(f.director, f.tangent, t), t, turn), t));
+        out.axial_force.push_back(state.axial_force[range.first_edge + i]);
+      }
+    }
+  }
+  out.velocity.assign(out.position.size(), Vec3::Zero());
+  out.twist_rate.assign(out.director.size(), 0.0);
+  out.turns.assign(fine_elements.cell_slot.size(), 0.0);
+  setTurns(rates, fine, fine_elements, out);
+  return out;
+}
+
+} // namespace tendril

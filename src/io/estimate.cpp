@@ -1,0 +1,190 @@
+#include "tendril/io/estimate.hpp"
+
+#include "tendril/dynamics/prolong.hpp"
+
+#include <algorithm>
+#include <iomanip>
+#include <sstream>
+
+namespace tendril {
+namespace {
+
+/// Above this part of the largest displacement, a difference is not an error of discretisation.
+constexpr double most_difference = 0.3;
+/// Differences below this part of the length are rounding, whatever the displacement.
+constexpr double least_difference = 1e-6;
+
+constexpr std::pair<const char *, double EnergyBudget::*> energies[] = {
+    {"stretch", &EnergyBudget::stretch}, {"bend", &EnergyBudget::bend}, {"twist", &EnergyBudget::twist}, {"gravity", &EnergyBudget::gravity}};
+
+template <class... Parts> std::string text(const Parts &...parts) {
+  std::ostringstream s;
+  s << std::setprecision(3);
+  (s << ... << parts);
+  return s.str();
+}
+
+std::string exactly(double value) {
+  std::ostringstream s;
+  s << std::setprecision(8) << value;
+  return s.str();
+}
+
+} // namespace
+
+Answer answerOf(const Simulation &run, std::vector<double> critical) {
+  return {true, "", run.state.time, run.state.position, energyBudget(run.scene, *run.elements, run.state, run.state.time), std::move(critical)};
+}
+
+PetscErrorCode solveStatics(Simulation &run, Scene scene, const LoopSettings &settings, Answer *answer) {
+  PetscFunctionBeginUser;
+  PetscCall(run.setUp(std::move(scene), settings));
+  TimeLoop loop(run.solver, settings);
+  std::vector<double> critical;
+  loop.on_critical = [&](const CriticalPoint &point) {
+    critical.push_back(point.load_factor);
+    return PetscErrorCode(0);
+  };
+  bool found;
+  PetscCall(loop.run(
+      run.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &found));
+  *answer = answerOf(run, std::move(critical));
+  answer->found = found;
+  answer->failure = loop.failure();
+  PetscFunctionReturn(0);
+}
+
+/// One step without a load step, from the answer of `run` on its edges cut in two.
+static PetscErrorCode solveFrom(const Simulation &run, const Scene &scene, const LoopSettings &settings, Answer *answer) {
+  Simulation fine;
+  NewtonReport report;
+  PetscFunctionBeginUser;
+  PetscCall(fine.setUp(scene, settings));
+  fine.state = prolonged(run.state, run.scene, *run.elements, fine.scene, *fine.elements);
+  PetscCall(fine.solver.solve(fine.state, TimeLoop::stepOf(settings, fine.state, 0), &report));
+  if (report.converged) {
+    fine.potential->commit(fine.state);
+    *answer = answerOf(fine);
+  } else
+    answer->failure = report.reason;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode estimateError(const Simulation &run, const std::vector<double> &critical, const Scene &scene, const LoopSettings &settings, Estimate *estimate) {
+  PetscFunctionBeginUser;
+  const Answer coarse = answerOf(run, critical);
+  Answer fine;
+  estimate->none = "the run ended before its full load";
+  if (coarse.load_factor == settings.t_end) {
+    PetscCall(solveFrom(run, scene, settings, &fine));
+    estimate->none = fine.failure;
+    if (fine.found) *estimate = richardson(run.scene, coarse, fine);
+    if (estimate->none.empty() && critical.empty()) PetscFunctionReturn(0);
+  }
+  Simulation path;
+  PetscCall(solveStatics(path, scene, settings, &fine));
+  if (!fine.found) {
+    (estimate->none.empty() ? estimate->no_critical : estimate->none) = "with half the edges' lengths, " + fine.failure;
+    PetscFunctionReturn(0);
+  }
+  if (!estimate->none.empty()) *estimate = richardson(run.scene, coarse, fine);
+  if (fine.critical.size() != critical.size())
+    estimate->no_critical = text(critical.size(), " were found, ", fine.critical.size(), " with half the edges' lengths");
+  else
+    for (std::size_t k = 0; k < critical.size(); ++k) {
+      estimate->critical.push_back(fine.critical[k] + (fine.critical[k] - critical[k]) / 3);
+      estimate->critical_error.push_back(std::abs(fine.critical[k] - critical[k]) * 4 / 3);
+    }
+  PetscFunctionReturn(0);
+}
+
+int Estimate::worstRod() const {
+  return int(std::max_element(rods.begin(), rods.end(), [](const RodEstimate &a, const RodEstimate &b) { return a.error / a.length < b.error / b.length; }) -
+             rods.begin());
+}
+
+Estimate richardson(const Scene &scene, const Answer &coarse, const Answer &fine) {
+  Estimate out;
+  std::size_t first = 0, fine_first = 0; // vertices of the rod
+  for (const Rod &rod : scene.rods) {
+    RodEstimate &r = out.rods.emplace_back();
+    out.tan = out.tan || rod.measure == Measure::tan;
+    for (int i = 0; i < rod.edges(); ++i) r.length += rod.edge(i).norm();
+    for (int v = 0; v < rod.vertices(); ++v) {
+      const Vec3 &a = coarse.position[first + v], &b = fine.position[fine_first + 2 * v];
+      const double error = (b - a).norm() * 4 / 3;
+      out.position.push_back(b + (b - a) / 3);
+      out.error.push_back(error);
+      r.displacement = std::max(r.displacement, (a - rod.position[v]).norm());
+      if (error > r.error) r.vertex = v;
+      r.error = std::max(r.error, error);
+      r.tip = error;
+    }
+    if (out.none.empty() && r.error > std::max(most_difference * r.displacement, least_difference * r.length))
+      out.none = text("rod '", rod.name, "' differs between ", rod.edges(), " and ", 2 * rod.edges(), " edges by ", r.error * 3 / 4,
+                      " m where its largest displacement is ", r.displacement,
+                      " m: the two answers are on different branches of equilibria, or the edges are too long");
+    first += rod.vertices();
+    fine_first += rod.vertices() + rod.edges();
+  }
+  if (coarse.load_factor != fine.load_factor)
+    out.none = text("the two answers end at different load factors, ", exactly(coarse.load_factor), " and ", exactly(fine.load_factor));
+  out.energy = coarse.energy;
+  for (const auto &[name, member] : energies) out.energy_error.*member = (coarse.energy.*member - fine.energy.*member) * 4 / 3;
+  return out;
+}
+
+std::vector<std::string> describe(const Estimate &e, const Scene &scene) {
+  std::vector<std::string> lines;
+  if (e.none.empty()) {
+    const RodEstimate &worst = e.rods[e.worstRod()];
+    lines.push_back(text("estimated error: position ", worst.error, " m, ", worst.error / worst.length, " of the length of rod '",
+                         scene.rods[e.worstRod()].name, "' (vertex ", worst.vertex, ")"));
+    std::string line;
+    for (const auto &[name, member] : energies)
+      if (e.energy.*member != 0)
+        line += (line.empty() ? "" : ", ") + text(name, " energy ", std::abs(e.energy_error.*member), " of ") + exactly(e.energy.*member) + " J";
+    if (!line.empty()) lines.push_back("estimated error: " + line);
+    if (e.tan)
+      lines.push_back(
+          "measure tan: the estimate holds, but its series has more terms than that of measure angle, with which the extrapolated positions are closer");
+  } else
+    lines.push_back("no estimate: " + e.none);
+  for (std::size_t k = 0; k < e.critical.size(); ++k)
+    lines.push_back(text("estimated error: critical load factor ", e.critical_error[k], ", extrapolated ") + exactly(e.critical[k]));
+  if (!e.no_critical.empty()) lines.push_back("no estimate of critical load factors: " + e.no_critical);
+  return lines;
+}
+
+void writeEstimate(const std::string &path, const Estimate &e) {
+  Hdf5File file = Hdf5File::reopen(path);
+  file.createGroup("estimate");
+  file.writeAttribute("estimate", "valid", int(e.none.empty()));
+  if (!e.critical.empty()) {
+    file.write("estimate/critical_load_factor", {e.critical.size()}, e.critical.data());
+    file.write("estimate/critical_error", {e.critical.size()}, e.critical_error.data());
+  }
+  if (!e.none.empty()) return file.writeAttribute("estimate", "reason", e.none);
+  const hsize_t n = e.position.size();
+  file.write("estimate/position", {n, 3}, e.position[0].data());
+  file.write("estimate/error", {n}, e.error.data());
+  const RodEstimate &worst = e.rods[e.worstRod()];
+  file.writeAttribute("estimate", "position_error", worst.error);
+  file.writeAttribute("estimate", "relative_position_error", worst.error / worst.length);
+  for (const auto &[name, member] : energies) file.writeAttribute("estimate", std::string(name) + "_energy_error", std::abs(e.energy_error.*member));
+}
+
+std::optional<double> accumulatedTimeError(const Diagnostics &row) {
+  const auto &names = Diagnostics::names();
+  const auto found = std::find(names.begin(), names.end(), "error_estimate");
+  if (found == names.end()) return std::nullopt;
+  return row.values()[std::size_t(found - names.begin())];
+}
+
+void writeTimeError(const std::string &path, double error) {
+  Hdf5File file = Hdf5File::reopen(path);
+  file.createGroup("estimate");
+  file.writeAttribute("estimate", "time_error", error);
+}
+
+} // namespace tendril

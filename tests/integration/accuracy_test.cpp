@@ -1,0 +1,165 @@
+/// Estimated errors against those to exact solutions, and the edges chosen by them.
+#include "tendril/io/accuracy.hpp"
+#include "tendril/io/scene_reader.hpp"
+
+#include "support/files.hpp"
+#include "support/rods.hpp"
+
+namespace tendril::test {
+namespace {
+
+SceneFile verifyScene(const std::string &name) { return readScene(std::string(TENDRIL_SOURCE_DIR) + "/data/scenes/verify/" + name + ".yaml"); }
+
+Vec3 elasticaTip(double load) {
+  auto exact = referenceRow("elastica_tip_load.csv", load);
+  return {exact["x_tip"], -exact["delta"], 0};
+}
+
+/// Largest distance from the exact helix of data/scenes/verify/spring.yaml over the rod's length.
+double springError(const std::vector<Vec3> &x) {
+  const double radius = 0.995204585596881, height = 4.12280613908148, length = 31.5359302715388; // helical_spring.csv, fixed, 5 degrees, zr 1.5
+  double worst = 0;
+  for (std::size_t v = 0; v < x.size(); ++v) {
+    const double s = double(v) / double(x.size() - 1), angle = 10 * pi * s;
+    worst = std::max(worst, (x[v] - Vec3(1 - radius + radius * std::cos(angle), radius * std::sin(angle), height * s)).norm() / length);
+  }
+  return worst;
+}
+
+void estimateOf(const SceneFile &file, const std::vector<int> &edges, const LoopSettings &settings, Simulation &run, Estimate &estimate) {
+  std::vector<int> twice = edges;
+  for (int &n : twice) n *= 2;
+  Answer answer;
+  EXPECT_PETSC(solveStatics(run, redraw(file.scene, file.drawings, edges), settings, &answer));
+  ASSERT_TRUE(answer.found);
+  EXPECT_PETSC(estimateError(run, answer.critical, redraw(file.scene, file.drawings, twice), settings, &estimate));
+}
+
+TEST(ErrorEstimate, IsTheErrorOfTheElastica) {
+  const Vec3 exact = elasticaTip(10);
+  SceneFile file = verifyScene("tip_load");
+  for (const Measure measure : {Measure::angle, Measure::tan})
+    for (const int n : {16, 32, 64}) {
+      file.scene.rods[0].measure = measure;
+      Simulation run;
+      Estimate e;
+      estimateOf(file, {n}, statics(), run, e);
+      ASSERT_EQ(e.none, "");
+      const double error = (run.state.position.back() - exact).norm(), extrapolated = (e.position.back() - exact).norm();
+      const bool clean = measure == Measure::angle;
+      EXPECT_NEAR(e.error.back(), error, (clean ? 0.01 : 0.06) * error) << n; // of the next term in the series: h^4, or that of the boundary layer's
+      EXPECT_LT(extrapolated, error / 4 / (clean ? 100 : 2.5)) << n;          // error/4: that of the answer at h/2
+    }
+}
+
+TEST(ErrorEstimate, IsTheErrorOfASpring) {
+  const SceneFile file = verifyScene("spring");
+  Simulation run;
+  Estimate e;
+  estimateOf(file, {160}, statics(10), run, e);
+  ASSERT_EQ(e.none, "");
+  const double error = springError(run.state.position);
+  EXPECT_NEAR(e.relativeError(), error, 0.06 * error); // the clamps' tangents, extrapolated from the drawing, add a cubic term
+  EXPECT_LT(springError(e.position), error / 4 / 3);
+}
+
+TEST(ErrorEstimate, OfPointsIsThatOfTheirCurve) {
+  SceneFile file = verifyScene("hanging_helix");
+  Simulation curve, points;
+  Estimate of_curve, of_points;
+  estimateOf(file, {64}, statics(), curve, of_curve);
+  file.scene = redraw(file.scene, file.drawings, {64});
+  file.drawings[0].curve = nullptr;
+  estimateOf(file, {64}, statics(), points, of_points);
+  EXPECT_NEAR(of_points.relativeError(), of_curve.relativeError(), 0.1 * of_curve.relativeError()); // the cubics are off by h^4
+}
+
+TEST(ErrorEstimate, StaysOnTheBranchOfABuckledColumn) {
+  SceneFile file = readScene(std::string(TENDRIL_SOURCE_DIR) + "/data/scenes/column.yaml");
+  file.scene.rods[0].material.flexural_stiffness = {1, 4}; // a round one may turn about its axis for nothing
+  Simulation run;
+  Estimate e;
+  estimateOf(file, {32}, statics(10), run, e); // its load steps may buckle to either side
+  EXPECT_EQ(e.none, "");
+  ASSERT_EQ(e.critical.size(), 1u);
+  EXPECT_NEAR(e.critical[0], pi * pi / 16, 1e-6); // error at 64 edges 3e-5
+}
+
+TEST(ErrorEstimate, TellsWhenAnswersAreNotNeighbours) {
+  const SceneFile file = verifyScene("tip_load");
+  Simulation coarse, fine;
+  Answer a, b;
+  EXPECT_PETSC(solveStatics(coarse, file.scene, statics(), &a));
+  Scene up = redraw(file.scene, file.drawings, {32});
+  up.forces[0].force *= -1;
+  EXPECT_PETSC(solveStatics(fine, up, statics(), &b));
+  const Estimate e = richardson(coarse.scene, a, b);
+  EXPECT_TRUE(says(e.none, "different branches"));
+  EXPECT_TRUE(says(describe(e, coarse.scene)[0], "no estimate"));
+}
+
+TEST(Accuracy, IsMetOnTheElastica) {
+  const SceneFile file = verifyScene("tip_load");
+  for (const Quantity of : {Quantity::position, Quantity::tip})
+    for (const double tolerance : {1e-2, 1e-3, 1e-4, 1e-5}) {
+      Choice choice;
+      EXPECT_PETSC(chooseEdges(file.scene, file.drawings, statics(), {tolerance, of}, &choice));
+      Simulation run;
+      runTo(run, redraw(file.scene, file.drawings, choice.edges), statics());
+      const double error = (run.state.position.back() - elasticaTip(10)).norm();
+      EXPECT_LT(error, tolerance);
+      EXPECT_GT(error, tolerance / 2) << "too many edges: " << choice.edges[0];
+      EXPECT_TRUE(says(choice.lines.back(), "edges " + std::to_string(choice.edges[0])));
+    }
+}
+
+TEST(Accuracy, OfTheEnergyIsMetOnTheElastica) {
+  const SceneFile file = verifyScene("tip_load");
+  Choice choice;
+  EXPECT_PETSC(chooseEdges(file.scene, file.drawings, statics(), {1e-4, Quantity::energy}, &choice));
+  Simulation run;
+  runTo(run, redraw(file.scene, file.drawings, choice.edges), statics());
+  const double exact = 1.79535565212409; // elastica_tip_load.csv
+  EXPECT_NEAR(energyBudget(run.scene, *run.elements, run.state, 1).bend, exact, 1e-4 * exact);
+}
+
+TEST(Accuracy, IsMetOnASpring) {
+  const SceneFile file = verifyScene("spring");
+  for (const double tolerance : {2e-5, 1e-6}) {
+    Choice choice;
+    EXPECT_PETSC(chooseEdges(file.scene, file.drawings, statics(10), {tolerance}, &choice));
+    Simulation run;
+    runTo(run, redraw(file.scene, file.drawings, choice.edges), statics(10));
+    const double error = springError(run.state.position);
+    EXPECT_LT(error, tolerance);
+    EXPECT_GT(error, tolerance / 3) << "too many edges: " << choice.edges[0]; // predicted from few edges, where the cubic term counts
+  }
+}
+
+TEST(Accuracy, IsChosenRodByRod) {
+  SceneFile file = verifyScene("tip_load");
+  file.scene.rods.push_back(file.scene.rods[0]);
+  file.scene.rods[1].name = "light";
+  file.drawings.push_back(file.drawings[0]);
+  file.scene.supports.push_back(file.scene.supports[0]);
+  file.scene.supports[1].rod = 1;
+  file.scene.forces.push_back({1, 16, Vec3(0, -0.5, 0)});
+  Choice choice;
+  EXPECT_PETSC(chooseEdges(file.scene, file.drawings, statics(), {1e-4}, &choice));
+  EXPECT_LT(choice.edges[1], choice.edges[0] / 2);
+  EXPECT_LT(choice.error[0], 1e-4);
+  EXPECT_LT(choice.error[1], 1e-4);
+}
+
+TEST(Accuracy, ThatCannotBeReachedIsTold) {
+  const SceneFile file = verifyScene("tip_load");
+  const std::string message = messageOf([&] {
+    Choice choice;
+    (void)chooseEdges(file.scene, file.drawings, statics(), {1e-15}, &choice);
+  });
+  EXPECT_TRUE(says(message, "option -accuracy"));
+  EXPECT_TRUE(says(message, "larger tolerance"));
+}
+
+} // namespace
+} // namespace tendril::test
