@@ -114,6 +114,20 @@ void setSupports(const Scene &scene, const Elements &elements, double motion_tim
   });
 }
 
+std::vector<double> strainsOf(const Elements &elements, const Configuration &c) {
+  const std::size_t row = strainRow(elements);
+  std::vector<double> strains(4 * row, 0.0);
+  for (const int s : elements.edge_slot) strains[s] = c[Configuration::strain][s];
+  for (int r = 0; r < int(elements.rods.size()); ++r)
+    forCells(elements, r, [&]<class T>(const LooseCell &cell, int count) {
+      const auto [f0, f1] = cellFrames<T>(c, cell, count);
+      const CellOf<T> constants = cellOf<T>(elements.cells(), c, cell.slot);
+      const std::array<T, 3> s = elements.measure[r] == Measure::tan ? cellStrain<Measure::tan>(f0, f1, constants) : cellStrain<Measure::angle>(f0, f1, constants);
+      for (int k = 0; k < 3; ++k) write(strains.data() + (k + 1) * row + cell.slot, s[k]);
+    });
+  return strains;
+}
+
 Configuration configurationOf(const State &state, const Scene &scene, const Elements &elements, double motion_time) {
   Configuration c(elements.slots);
   setSupports(scene, elements, motion_time, c);

@@ -80,8 +80,18 @@ public:
   /// The largest of each over all rods.
   Residual residual();
 
-  /// State after the step: velocities by backward Euler, directors made orthonormal.
+  /// Displacements of the iterate since the step began, and the rates that follow from them by a rule; strains when asked for.
+  StageRates stageRates(const StageRule &rule, bool with_strains) const;
+  const Configuration &start() const { return start_; }
+  double length(int rod) const { return length_[rod]; } ///< at rest [m]
+  /// From the middle of a step to its end at `time`: positions, spins and directors move on by as much again (supports to their places), axial
+  /// forces come from the strains. False when that leads to an impossible configuration.
+  bool moveOn(double time);
+
+  /// State after a step of backward Euler or of statics.
   void commit(State &state) const;
+  /// The same without velocities: positions, directors made orthonormal, axial forces, time.
+  void commitConfiguration(State &state) const;
 
 private:
   const Scene &scene_;
@@ -108,7 +118,7 @@ private:
 
   double reachOf(const Configuration &configuration, const RodRange &rod) const;
   double steepnessOf(const Configuration &configuration, int rod) const;
-  void turnSupports();
+  void turnSupports(const Configuration &from, double from_time);
   void followSupports(int rod);
   double forceScale(const State &start, int rod) const;
 };
