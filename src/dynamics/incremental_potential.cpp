@@ -34,10 +34,11 @@ IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, con
       start_(elements.slots), derivatives_(dofs), known_(elements.rods.size(), Known::nothing) {
   for (std::size_t r = 0; r < elements.rods.size(); ++r) {
     const RodRange &rod = elements.rods[r];
-    double sum = 0, shortest = HUGE_VAL, bending = 0, cell = HUGE_VAL;
+    double sum = 0, shortest = HUGE_VAL, longest = 0, bending = 0, cell = HUGE_VAL;
     for (int s = rod.first_slot; s < rod.edgeEnd(); ++s) {
       sum += elements.restLength()[s];
       shortest = std::min(shortest, elements.restLength()[s]);
+      longest = std::max(longest, elements.restLength()[s]);
     }
     for (int n = elements.rod_cells[r]; n < elements.rod_cells[r + 1]; ++n) {
       cell = std::min(cell, elements.cellLength()[elements.cell_slot[n]]);
@@ -45,6 +46,7 @@ IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, con
     }
     length_.push_back(sum);
     shortest_.push_back(shortest);
+    longest_.push_back(longest);
     bending_.push_back(bending);
     shortest_cell_.push_back(cell);
   }
@@ -57,6 +59,8 @@ void IncrementalPotential::beginStep(const State &start, const Step &step) {
   step_ = step;
   setSupports(scene_, elements_, start.time, start_);
   if (iterate_.empty()) iterate_ = start_;
+  if (step.rule && reference_.empty()) reference_ = start_;
+  step_.twist_reference = step.rule ? &reference_ : nullptr;
   turnSupports(start_, start_time_);
   retraction_.setInverseTimeSquared(step.isStatic() ? 0 : 1 / (step.dt * step.dt));
 }
@@ -64,6 +68,7 @@ void IncrementalPotential::beginStep(const State &start, const Step &step) {
 void IncrementalPotential::beginRod(const State &start, int r) {
   setRod(start, elements_, r, start_);
   iterate_.copyRod(elements_, r, start_);
+  if (step_.rule) carryFrames(*step_.rule, start, elements_, r, start_, reference_);
   axial_.beginStep(start_, step_, r);
   for (auto &term : terms_) term->beginStep(start, start_, step_, r);
   followSupports(r);
@@ -344,8 +349,10 @@ IncrementalPotential::Residual IncrementalPotential::residual(int r) {
   result.force = std::sqrt(force) / scale;
   result.moment = std::sqrt(moment) / (scale * length_[r]);
   result.compatibility = step_.mixed ? hmax(error) : 0;
-  result.force_floor = 4 * count * strain_noise * (stretching + (m.isCable() ? 0 : bending / shortest_[r])) / scale;
-  if (!m.isCable()) result.moment_floor = 4 * count * strain_noise * bending / (scale * length_[r]);
+  // Inertia turns an error of position or twist into a force or a moment, which counts in short steps.
+  const double inertia = step_.isStatic() ? 0 : longest_[r] / (step_.dt * step_.dt), heavy = m.linear_density * shortest_[r] * inertia, spinning = m.linear_rotational_inertia * inertia;
+  result.force_floor = 4 * count * strain_noise * (stretching + heavy + (m.isCable() ? 0 : bending / shortest_[r])) / scale;
+  if (!m.isCable()) result.moment_floor = 4 * count * strain_noise * (bending + spinning) / (scale * length_[r]);
   result.compatibility_floor = 16 * strain_noise;
   return result;
 }
@@ -377,7 +384,7 @@ IncrementalPotential::Residual IncrementalPotential::residual() {
       rates.acceleration.vertex[v] = (rule.mass * velocity + rule.acceleration.atVertex(v)) * rate;
     }
     for (int i = 0; i < rod.edges; i += lanes) {
-      const Pack spun = spinOver(start_, iterate_, rod.slot(i)).total;
+      const Pack spun = spinOver(twistReference(), iterate_, rod.slot(i)).total;
       for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) {
         const int e = rod.first_edge + i + l;
         const double d = spun[l], velocity = d * rate + rule.velocity.atEdge(e);
@@ -391,8 +398,8 @@ IncrementalPotential::Residual IncrementalPotential::residual() {
   return rates;
 }
 
-/// Edges of the start, the middle and the end lie in a plane, so that the minimal rotations of the two halves make up that of the whole step: the
-/// spin of an edge over the step is twice that over its half.
+/// An edge at the start, in the middle and at the end lies in one plane, so that the minimal rotations of the two halves make up that of the whole
+/// step: its spin over the step is twice that over its half, with no holonomy between.
 bool IncrementalPotential::moveOn(double time) {
   Planes increment = dofs_.makePlanes();
   Configuration trial;
@@ -403,7 +410,7 @@ bool IncrementalPotential::moveOn(double time) {
     const RodRange &rod = elements_.rods[r];
     for (int i = 0; i < rod.vertices; ++i) increment.setVector(0, rod.slot(i), iterate_.positionAt(rod.slot(i)) - start_.positionAt(rod.slot(i)));
     for (int i = 0; rod.twist && i < rod.edges; i += lanes) {
-      const Pack spun = spinOver(start_, iterate_, rod.slot(i)).total;
+      const Pack spun = spinOver(twistReference(), iterate_, rod.slot(i)).total;
       for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) increment[3][rod.slot(i + l)] = spun[l];
     }
     dofs_.copyBehindRing(rod, increment);

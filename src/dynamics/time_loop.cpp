@@ -54,7 +54,7 @@ PetscErrorCode TimeLoop::solveStages(const State &start, const Step &step, Newto
     report->reason = one.reason;
     report->negative_pivots = one.negative_pivots;
     if (!one.converged) PetscFunctionReturn(0);
-    stages_.push_back(potential.stageRates(rule, dissipates && k + 1 < count));
+    stages_.push_back(potential.stageRates(rule, dissipates && (k + 1 < count || !integrator_->endsAtStage())));
   }
   if (!integrator_->endsAtStage() && !potential.moveOn(step.time)) {
     report->converged = false;
@@ -69,9 +69,11 @@ void TimeLoop::finishStages(State &state, double h) {
   const Scene &scene = potential.scene();
   const bool keeps = integrator_->remembersStrains() && std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &rod) { return rod.material.stiffness_damping_coefficient != 0; });
   if (keeps) state.strains = strainsOf(potential.elements(), potential.start());
+  if (keeps && !integrator_->endsAtStage()) // as far beyond the middle
+    std::transform(state.strains.begin(), state.strains.end(), stages_.back().strains.begin(), state.strains.begin(), [](double start, double middle) { return 2 * middle - start; });
   integrator_->finish(state, h, stages_);
-  if (state.memory.empty()) return;
-  state.last_dt = h;
+  if (!state.memory.empty()) state.last_dt = h;
+  if (integrator_->order() == 1) return; // its velocities are chords everywhere
   for (const Support &support : scene.supports) {
     if (!support.holdsPosition()) continue;
     const int v = potential.elements().rods[support.rod].first_vertex + support.vertex;

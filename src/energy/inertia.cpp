@@ -12,7 +12,7 @@ public:
   /// With v = d/dt + u and acceleration (mass v + b)/dt (StageRule), inertia and dissipation are m (mass/dt^2 + alpha/dt) (d - d_hat),
   /// d_hat = -dt u - b dt/(mass + alpha dt); the same for the twist increment. Backward Euler has mass 1, u = 0 and b = -v_n.
   void beginStep(const State &state, const Configuration &start, const Step &step, int r) override {
-    start_ = &start;
+    start_ = step.twist_reference ? step.twist_reference : &start;
     const RodRange &rod = elements_.rods[r];
     const double alpha = scene_.rods[r].material.mass_damping_coefficient;
     const double mass = step.rule ? step.rule->mass : 1;
@@ -87,7 +87,7 @@ public:
 private:
   const Scene &scene_;
   const Elements &elements_;
-  const Configuration *start_ = nullptr;
+  const Configuration *start_ = nullptr; ///< twist is measured from its frames
   Planes predicted_; ///< positions, and twists since the start
   std::vector<double> weight_;
 };

@@ -18,48 +18,93 @@ struct Sharp {
   ~Sharp() { EXPECT_EQ(PetscOptionsClearValue(nullptr, "-snes_rtol"), PetscErrorCode(0)); }
 };
 
-/// A quarter of a circle, clamped, pulled out of its plane: bends, twists and stretches. \param axial EA L^2/EI
-Scene arcScene(double axial, double stiffness_damping = 0) {
-  std::vector<Vec3> points;
-  const int edges = 10;
-  for (int k = 0; k <= edges; ++k) points.emplace_back(std::sin(pi / 2 * k / edges) * 2 / pi, (1 - std::cos(pi / 2 * k / edges)) * 2 / pi, 0);
-  Rod rod = inextensibleRod(points, Measure::angle);
+/// A straight rod, clamped, stiffer one way than the other: bends in space, twists and stretches. \param axial EA L^2/EI
+Scene swingScene(double axial, double stiffness_damping = 0) {
+  Rod rod = straightRod(8, Measure::angle);
   rod.material.axial_stiffness = axial;
+  rod.material.flexural_stiffness = {1, 2};
   rod.material.linear_rotational_inertia = 1e-2;
   rod.material.stiffness_damping_coefficient = stiffness_damping;
-  Scene scene = clampedScene(rod);
-  scene.gravity = Vec3(0, -3, 5);
-  return scene;
+  return clampedScene(rod);
 }
 
-/// Largest distance between vertices, and between directors.
-double apart(const State &a, const State &b) {
-  double worst = 0;
-  for (std::size_t v = 0; v < a.position.size(); ++v) worst = std::max(worst, (a.position[v] - b.position[v]).norm());
-  for (std::size_t e = 0; e < a.director.size(); ++e) worst = std::max(worst, (a.director[e] - b.director[e]).norm());
-  return worst;
-}
-
-/// Order from three runs with halved steps, without a reference: the differences of neighbours fall like the errors.
-double observedOrder(const Scene &scene, const std::string &integrator, double dt, double t_end) {
-  Simulation runs[3];
-  for (int k = 0; k < 3; ++k) runTo(runs[k], scene, with(integrator, dt / (1 << k), t_end));
-  return order(apart(runs[0].state, runs[1].state), apart(runs[1].state, runs[2].state));
-}
-
-/// Asymptotic up to terms of the next order, which at these steps (a hundredth of the first period) are a tenth of the error: 0.3 of the order.
-TEST(Integrator, HasItsOrder) {
-  const Sharp sharp;
-  for (const double axial : {1e4, 1e8}) {
-    EXPECT_NEAR(observedOrder(arcScene(axial), "euler", 2e-3, 0.4), 1, 0.15) << axial;
-    for (const std::string &name : second_order) EXPECT_NEAR(observedOrder(arcScene(axial), name, 1e-2, 0.4), 2, 0.3) << name << " " << axial;
+/// Sets a swing going with the shape that a uniform load gives it: little but the slowest motion.
+void start(Simulation &sim, const LoopSettings &settings, const Scene &scene) {
+  EXPECT_PETSC(sim.setUp(scene, settings));
+  for (std::size_t v = 0; v < sim.state.position.size(); ++v) {
+    const double s = sim.state.position[v][0], shape = s * s * (6 - 4 * s + s * s) / 3;
+    sim.state.velocity[v] = Vec3(0, 2.5 * shape, 1.5 * shape);
   }
 }
 
+/// What a run did.
+struct Outcome {
+  State state;
+  int steps = 0, iterations = 0, rejected = 0;
+  double estimate = 0;
+  std::vector<double> times;
+};
+Outcome runOn(Simulation &sim, const LoopSettings &settings) {
+  Outcome run;
+  TimeLoop loop(sim.solver, settings);
+  bool finished = false;
+  EXPECT_EQ(loop.run(
+                sim.state,
+                [&](const State &state, const Diagnostics &row) {
+                  ++run.steps;
+                  run.iterations += row.newton_iterations;
+                  run.rejected += row.rejected_steps;
+                  run.estimate = row.error_estimate;
+                  run.times.push_back(state.time);
+                  return PetscErrorCode(0);
+                },
+                &finished),
+            PetscErrorCode(0));
+  EXPECT_TRUE(finished) << loop.failure();
+  run.state = sim.state;
+  return run;
+}
+Outcome swing(const LoopSettings &settings, double axial, double stiffness_damping = 0) {
+  Simulation sim;
+  start(sim, settings, swingScene(axial, stiffness_damping));
+  return runOn(sim, settings);
+}
+
+/// Largest distance between vertices, and between directors.
+double apart(const State &a, const State &b, bool directors = true) {
+  double worst = 0;
+  for (std::size_t v = 0; v < a.position.size(); ++v) worst = std::max(worst, (a.position[v] - b.position[v]).norm());
+  for (std::size_t e = 0; directors && e < a.director.size(); ++e) worst = std::max(worst, (a.director[e] - b.director[e]).norm());
+  return worst;
+}
+
+/// Mean order over two halvings, without a reference: the differences of neighbours fall like the errors. A fifth of the slowest period.
+double observedOrder(const std::string &integrator, double dt, double axial, double stiffness_damping, bool directors) {
+  State runs[4];
+  for (int k = 0; k < 4; ++k) runs[k] = swing(with(integrator, dt / (1 << k), 0.4), axial, stiffness_damping).state;
+  return 0.5 * order(apart(runs[0], runs[1], directors), apart(runs[2], runs[3], directors));
+}
+
+/// Positions alone: without dissipation the directors carry twist waves of every length, some too fast for the steps. Terms of the next order are
+/// less than a tenth of the error: 0.15 of the order. On a rod that is as good as inextensible the start is not smooth, for the axial force jumps to
+/// that of the swing: 0.45. sdirk2 is a method of first order there (docs/theory.md).
+TEST(Integrator, HasItsOrder) {
+  const Sharp sharp;
+  EXPECT_NEAR(observedOrder("euler", 2.5e-3, 1e2, 0, false), 1, 0.1);
+  EXPECT_NEAR(observedOrder("euler", 2.5e-3, 1e8, 0, false), 1, 0.1);
+  for (const std::string &name : second_order) {
+    EXPECT_NEAR(observedOrder(name, 2.5e-3, 1e2, 0, false), 2, 0.15) << name;
+    EXPECT_NEAR(observedOrder(name, 1e-2, 1e8, 0, true), name == "sdirk2" ? 1 : 2, 0.45) << name;
+  }
+}
+
+/// Dissipation smooths the motion: the order is clean.
 TEST(Integrator, KeepsItsOrderWithDissipationByStiffness) {
   const Sharp sharp;
-  for (const std::string &name : {"bdf2", "sdirk2", "generalized_alpha"}) EXPECT_NEAR(observedOrder(arcScene(1e4, 0.05), name, 1e-2, 0.4), 2, 0.3) << name;
-  EXPECT_GT(observedOrder(arcScene(1e4, 0.05), "midpoint", 1e-2, 0.4), 0.8); // its strain rate is a difference from the start
+  for (const std::string &name : second_order) {
+    EXPECT_NEAR(observedOrder(name, 5e-3, 1e2, 0.02, true), 2, 0.1) << name;
+    EXPECT_NEAR(observedOrder(name, 1e-2, 1e8, 0.02, true), name == "sdirk2" ? 1 : 2, 0.2) << name;
+  }
 }
 
 TEST(Integrator, KeepsItsOrderWithDissipationByMass) {
@@ -80,17 +125,12 @@ TEST(Integrator, KeepsItsOrderWithDissipationByMass) {
   }
 }
 
-/// Steps of a pattern of lengths, each through a loop of its own.
-State patternOfSteps(const Scene &scene, const std::string &integrator, double dt, double t_end) {
-  Simulation sim;
-  EXPECT_EQ(sim.setUp(scene, with(integrator, dt, t_end)), PetscErrorCode(0));
+/// Steps of a pattern of lengths, each through a loop of its own, from the state of a simulation.
+State patternOfSteps(Simulation &sim, const std::string &integrator, double dt, double t_end) {
   const double pattern[] = {1, 2, 1.5, 0.5, 1, 0.4, 0.6}; // sums to 7
   for (int k = 0; sim.state.time < t_end * (1 - 1e-9); ++k) {
     const double h = dt * pattern[k % 7];
-    TimeLoop loop(sim.solver, with(integrator, h, sim.state.time + h));
-    bool finished = false;
-    EXPECT_EQ(loop.run(sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished), PetscErrorCode(0));
-    EXPECT_TRUE(finished) << loop.failure();
+    runOn(sim, with(integrator, h, sim.state.time + h));
   }
   return sim.state;
 }
@@ -98,9 +138,13 @@ State patternOfSteps(const Scene &scene, const std::string &integrator, double d
 TEST(Integrator, KeepsItsOrderWithStepsThatVary) {
   const Sharp sharp;
   for (const std::string &name : second_order) {
-    State s[3];
-    for (int k = 0; k < 3; ++k) s[k] = patternOfSteps(arcScene(1e4), name, 8e-3 / (1 << k), 0.448); // 8, 16, 32 patterns
-    EXPECT_NEAR(order(apart(s[0], s[1]), apart(s[1], s[2])), 2, 0.35) << name;
+    State s[4];
+    for (int k = 0; k < 4; ++k) {
+      Simulation sim;
+      start(sim, with(name, 1, 1), swingScene(1e2, 0.02));
+      s[k] = patternOfSteps(sim, name, 4e-3 / (1 << k), 0.448); // 16, 32, 64, 128 patterns
+    }
+    EXPECT_NEAR(0.5 * order(apart(s[0], s[1]), apart(s[2], s[3])), 2, 0.2) << name;
   }
 }
 
@@ -112,7 +156,9 @@ TEST(FreeFall, IsExactInSecondOrder) {
   scene.rods = {straightRod(10)};
   scene.rods[0].initial_velocity = Vec3(1, 2, 0);
   for (const std::string &name : second_order) {
-    const State s = patternOfSteps(scene, name, 0.01, 0.7);
+    Simulation sim;
+    EXPECT_PETSC(sim.setUp(scene, with(name, 1, 1)));
+    const State s = patternOfSteps(sim, name, 0.01, 0.7);
     const Vec3 moved = scene.rods[0].initial_velocity * s.time + scene.gravity * (0.5 * s.time * s.time);
     for (int v = 0; v <= 10; ++v) EXPECT_LT((s.position[v] - scene.rods[0].position[v] - moved).norm(), 1e-9) << name; // 70 steps, each to 1e-10 of the weight
   }
@@ -128,7 +174,7 @@ Flight fly(const std::string &integrator, double dt, int steps) {
   Scene scene;
   scene.gravity = Vec3::Zero();
   scene.rods = {straightRod(16)};
-  scene.rods[0].material.axial_stiffness = 1e4;
+  scene.rods[0].material.axial_stiffness = 1e3;
   Simulation sim;
   EXPECT_EQ(sim.setUp(scene, with(integrator, dt, dt * steps)), PetscErrorCode(0));
   const std::vector<Vec3> &x = sim.state.position;
@@ -174,22 +220,23 @@ TEST(FreeFlight, KeepsWhatEachMethodPromises) {
   for (const std::string &name : integratorNames()) {
     flights[name] = fly(name, 1e-2, 1000);
     EXPECT_LT(flights[name].momentum, 1e-9) << name; // forces add up to nothing
-    EXPECT_LT(flights[name].energy_most, 1.05) << name;
+    EXPECT_LT(flights[name].energy_most, 1.01) << name;
   }
-  EXPECT_GT(flights["midpoint"].energy_least, 0.95);
-  EXPECT_LT(flights["midpoint"].angular, 1e-8); // quadratic; 1000 steps of Newton's 1e-10
+  EXPECT_GT(flights["midpoint"].energy_least, 0.99);
+  EXPECT_LT(flights["midpoint"].angular, 1e-9); // quadratic in the motion
   EXPECT_LT(flights["euler"].energy_end, 0.8);
-  for (const char *name : {"bdf2", "sdirk2", "generalized_alpha"}) { // dissipation of third order: more than backward Euler keeps
+  EXPECT_GT(flights["generalized_alpha"].energy_end, 0.99);
+  for (const char *name : {"bdf2", "sdirk2"}) { // dissipation of third order
     EXPECT_GT(flights[name].energy_end, flights["euler"].energy_end) << name;
     EXPECT_LT(flights[name].angular, flights["euler"].angular) << name;
   }
 }
 
-/// A clamp that travels and turns: held vertices are where and as fast as the support says, at the ends of steps.
+/// A clamp that travels and turns: held vertices are where and as fast as the support says, and all methods find the same motion.
 TEST(Integrator, FollowsSupportsThatMove) {
+  State first;
   for (const std::string &name : second_order) {
-    Scene scene = clampedScene(straightRod(12, Measure::angle));
-    scene.rods[0].material.mass_damping_coefficient = 20;
+    Scene scene = swingScene(1e3, 0.1);
     Motion &motion = scene.supports[0].motion;
     motion.velocity = Vec3(0.5, 1, 0);
     motion.angular_velocity = Vec3(3 * pi, 0, 0); // one and a half turns about the rod
@@ -197,14 +244,17 @@ TEST(Integrator, FollowsSupportsThatMove) {
     runTo(sim, scene, with(name, 0.01, 1));
     EXPECT_LT((sim.state.position[0] - Vec3(0.5, 1, 0)).norm(), 1e-14) << name;
     EXPECT_LT((sim.state.velocity[0] - motion.velocity).norm(), 1e-14) << name;
-    for (const double w : sim.state.twist_rate) EXPECT_NEAR(w, 3 * pi, 0.5) << name; // the rod turns along; it also swings
+    if (first.twist_rate.empty()) first = sim.state;
+    for (int e = 0; e < 8; ++e) EXPECT_NEAR(sim.state.twist_rate[e], first.twist_rate[e], 0.1) << name; // of 3 pi: errors of second order at omega h = 0.1
+    EXPECT_LT(apart(sim.state, first), 0.02) << name;
   }
 }
 
 TEST(TimeLoop, RestoresTheMemoryWhenAStepFails) {
   for (const std::string &name : integratorNames()) {
     Simulation sim;
-    runTo(sim, arcScene(1e4), with(name, 0.01, 0.05));
+    start(sim, with(name, 1, 1), swingScene(1e4));
+    runOn(sim, with(name, 0.01, 0.05));
     const State before = sim.state;
     EXPECT_PETSC(SNESSetTolerances(sim.solver.snes(), 0, 1e-12, 0, 1, PETSC_MAX_INT)); // one iteration is never enough
     LoopSettings settings = with(name, 0.05, 1);
@@ -217,62 +267,35 @@ TEST(TimeLoop, RestoresTheMemoryWhenAStepFails) {
   }
 }
 
-struct Adapted {
-  State state;
-  int steps = 0, rejected = 0;
-  double estimate = 0;
-  std::vector<double> times;
-};
-Adapted adapt(const Scene &scene, LoopSettings settings, double rtol) {
+LoopSettings adapted(const std::string &integrator, double dt, double t_end, double rtol) {
+  LoopSettings settings = with(integrator, dt, t_end);
   settings.adapt = Adaptation::error;
   settings.dt_rtol = rtol;
   settings.dt_atol = 1e-3 * rtol;
-  Simulation sim;
-  EXPECT_EQ(sim.setUp(scene, settings), PetscErrorCode(0));
-  TimeLoop loop(sim.solver, settings);
-  bool finished = false;
-  Adapted result;
-  EXPECT_EQ(loop.run(
-                sim.state,
-                [&](const State &state, const Diagnostics &row) {
-                  ++result.steps;
-                  result.rejected += row.rejected_steps;
-                  result.estimate = row.error_estimate;
-                  result.times.push_back(state.time);
-                  return PetscErrorCode(0);
-                },
-                &finished),
-            PetscErrorCode(0));
-  EXPECT_TRUE(finished) << loop.failure();
-  result.state = sim.state;
-  return result;
+  return settings;
 }
 
-/// The sum of the local errors is that of the end up to a factor: errors of an oscillation turn and grow with its phase. The first step is far too long.
+/// The sum of the local errors bounds the error of the end up to a factor: errors turn and grow with the motion. The first step is far too long.
 TEST(Adaptation, MeetsItsTolerance) {
   const Sharp sharp;
-  const Scene scene = arcScene(1e4);
-  Simulation fine;
-  runTo(fine, scene, with("sdirk2", 5e-4, 0.8));
+  const State fine = swing(with("generalized_alpha", 2.5e-4, 0.8), 1e4, 1e-3).state;
   for (const std::string &name : integratorNames()) {
     const double rtol = name == "euler" ? 1e-2 : 1e-3;
-    const Adapted loose = adapt(scene, with(name, 0.1, 0.8), rtol), tight = adapt(scene, with(name, 0.1, 0.8), rtol / 8);
-    double errors[2] = {0, 0};
-    for (std::size_t v = 0; v < fine.state.position.size(); ++v)
-      for (int k = 0; k < 2; ++k) errors[k] = std::max(errors[k], ((k ? tight : loose).state.position[v] - fine.state.position[v]).norm());
-    EXPECT_LT(errors[0], 5 * loose.estimate) << name;
-    EXPECT_LT(errors[1], 5 * tight.estimate) << name;
+    const Outcome loose = swing(adapted(name, 0.1, 0.8, rtol), 1e4, 1e-3), tight = swing(adapted(name, 0.1, 0.8, rtol / 8), 1e4, 1e-3);
+    const double errors[2] = {apart(loose.state, fine), apart(tight.state, fine)};
+    EXPECT_LT(errors[0], 10 * loose.estimate) << name;
+    EXPECT_LT(errors[1], 10 * tight.estimate) << name;
     EXPECT_LT(errors[1], 0.5 * errors[0]) << name;
     EXPECT_GT(tight.steps, loose.steps) << name;
-    if (name != "midpoint") EXPECT_GT(tight.rejected, 0) << name; // its first step has nothing to compare with
+    EXPECT_GT(tight.rejected, 0) << name;
   }
 }
 
 TEST(Adaptation, LandsOnTheTimesOfFrames) {
-  LoopSettings settings = with("bdf2", 0.01, 0.35);
+  LoopSettings settings = adapted("bdf2", 0.01, 0.35, 1e-2);
   settings.output_interval = 0.1;
   settings.dt_max = 0.03;
-  const Adapted run = adapt(arcScene(1e4), settings, 1e-2);
+  const Outcome run = swing(settings, 1e4);
   double last = 0;
   for (const double t : run.times) {
     EXPECT_LE(t - last, 0.03 * (1 + 1e-9));
@@ -282,14 +305,30 @@ TEST(Adaptation, LandsOnTheTimesOfFrames) {
     EXPECT_TRUE(std::any_of(run.times.begin(), run.times.end(), [&](double a) { return std::abs(a - t) < 1e-15; })) << t;
 }
 
-/// On a stiff rod Newton takes about as many iterations as on a soft one.
+/// On a stiff rod Newton takes about as many iterations as on a soft one; midpoint, whose axial forces swing from step to step, more than twice as many.
 TEST(Integrator, IterationsDoNotGrowWithTheAxialStiffness) {
-  for (const std::string &name : integratorNames()) {
-    int soft = 0, stiff = 0;
-    Simulation a, b;
-    runTo(a, arcScene(1e4), with(name, 0.02, 1), &soft);
-    runTo(b, arcScene(1e12), with(name, 0.02, 1), &stiff);
-    EXPECT_LE(stiff, 1.5 * soft) << name;
+  for (const std::string &name : integratorNames())
+    for (const double axial : {1e8, 1e12})
+      EXPECT_LE(swing(with(name, 0.01, 0.4), axial).iterations, (name == "midpoint" ? 2.5 : 1.2) * swing(with(name, 0.01, 0.4), 1e4).iterations) << name << " " << axial;
+}
+
+/// The released cantilever against a Legendre-Galerkin solution (data/reference), at 5 ms: the figures are those measured with 50 edges, with a margin of a half.
+TEST(Integrator, FollowsTheReleasedCantilever) {
+  const std::map<std::string, double> largest{{"euler", 0.1}, {"bdf2", 8e-3}, {"sdirk2", 5e-3}, {"midpoint", 5e-3}, {"generalized_alpha", 5e-3}};
+  Rod rod = straightRod(50);
+  rod.material = homogeneousMaterial({SectionShape::circle, {0.005, 0}}, 1e7, 1e7 / 3, 1200);
+  for (const auto &[name, bound] : largest) {
+    Scene scene = clampedScene(rod);
+    scene.gravity = Vec3(0, 0, -9.81);
+    Simulation sim;
+    EXPECT_PETSC(sim.setUp(scene, with(name, 5e-3, 1)));
+    double sum = 0;
+    for (int k = 1; k <= 20; ++k) {
+      runOn(sim, with(name, 5e-3, 0.05 * k));
+      std::map<std::string, double> row = referenceRow("dyn_cantilever_A.csv", 0.05 * k);
+      sum += (sim.state.position.back() - Vec3(row["x"], 0, row["z"])).squaredNorm();
+    }
+    EXPECT_LT(std::sqrt(sum / 20), bound) << name;
   }
 }
 

@@ -109,10 +109,12 @@ private:
   };
   std::vector<Turned> turned_; ///< supports' frames that turn in this step
   Configuration start_, iterate_;
+  Configuration reference_; ///< frames from which stages measure twist
+  const Configuration &twistReference() const { return step_.twist_reference ? *step_.twist_reference : start_; }
   Derivatives derivatives_;
   enum class Known : char { nothing, gradient, all };
   std::vector<Known> known_; ///< per rod: what derivatives_ holds of the iterate
-  std::vector<double> load_, force_scale_, length_, shortest_; ///< per rod: loads [N], or 0; the present scale of forces [N]; lengths [m]
+  std::vector<double> load_, force_scale_, length_, shortest_, longest_; ///< per rod: loads [N], or 0; the present scale of forces [N]; lengths [m]
   std::vector<double> bending_, shortest_cell_;                ///< per rod: sum of the cells' stiffnesses [N m]; [m]
   bool beyond_barrier_ = false;
 

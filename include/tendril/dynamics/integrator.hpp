@@ -30,6 +30,9 @@ public:
   virtual void finish(State &state, double h, const Stages &done) const = 0;
 };
 
+/// Accelerations of a state from the forces on it. \param h about the length of a step [s]
+Rates startAcceleration(StepSolver &solver, double h, const State &state);
+
 struct IntegratorSettings {
   std::string name = "euler";
   double rho_inf = 0.8; ///< generalized_alpha: spectral radius at infinite frequency

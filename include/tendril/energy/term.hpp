@@ -21,6 +21,7 @@ struct Step {
   bool mixed = true;      ///< axial force as its own unknown, condensed edge by edge
   HessianKind hessian = HessianKind::exact;
   const StageRule *rule = nullptr; ///< of the stage, with the same dt; null: backward Euler
+  const Configuration *twist_reference = nullptr; ///< frames from which twist is measured (carryFrames); null: those of the start
   double dampingDt() const { return rule ? rule->damping_dt : dt; }
   bool isStatic() const { return dt == 0; }
 };

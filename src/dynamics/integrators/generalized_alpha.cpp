@@ -15,32 +15,9 @@ public:
 
   bool remembersStrains() const override { return true; }
 
-  /// a = (F - dU/dq)/m - alpha v where nothing is held, and A = a.
   PetscErrorCode begin(StepSolver &solver, double h, State &state) const override {
     PetscFunctionBeginUser;
-    IncrementalPotential &potential = solver.potential();
-    const Elements &elements = potential.elements();
-    StageRule rest; // at the start: neither velocities nor accelerations
-    rest.dt = rest.damping_dt = h;
-    Step step;
-    step.dt = h;
-    step.time = state.time;
-    step.rule = &rest;
-    solver.begin(state, step);
-    Rates a{std::vector<Vec3>(state.velocity.size(), Vec3::Zero()), std::vector<double>(state.twist_rate.size(), 0.0)};
-    for (int r = 0; r < int(elements.rods.size()); ++r) {
-      const RodRange &rod = elements.rods[r];
-      const Planes &force = potential.gradient(r).equilibrium;
-      const double damping = potential.scene().rods[r].material.mass_damping_coefficient;
-      for (int i = 0; i < rod.vertices; ++i) {
-        const int s = rod.slot(i), v = rod.first_vertex + i;
-        if (elements.freedom()[s] != 0 && elements.mass()[s] > 0) a.vertex[v] = -force.vector(0, s) / elements.mass()[s] - damping * state.velocity[v];
-      }
-      for (int i = 0; rod.twist && i < rod.edges; ++i) {
-        const int s = rod.slot(i), e = rod.first_edge + i;
-        if (elements.twistMass()[s] > 0) a.edge[e] = -force[3][s] / elements.twistMass()[s] - damping * state.twist_rate[e];
-      }
-    }
+    const Rates a = startAcceleration(solver, h, state);
     state.memory = {a, a};
     state.last_dt = h;
     PetscFunctionReturn(0);

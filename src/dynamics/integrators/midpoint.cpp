@@ -8,6 +8,13 @@ namespace {
 class Midpoint final : public Integrator {
 public:
   bool endsAtStage() const override { return false; }
+  bool remembersStrains() const override { return true; }
+
+  PetscErrorCode begin(StepSolver &solver, double h, State &state) const override {
+    PetscFunctionBeginUser;
+    state.memory = {startAcceleration(solver, h, state)};
+    PetscFunctionReturn(0);
+  }
 
   StageRule stage(const State &start, double h, const Stages &) const override {
     StageRule rule;
@@ -15,13 +22,17 @@ public:
     rule.dt = rule.damping_dt = 0.5 * h;
     rule.acceleration.add(-1, start);
     rule.guess.add(0.5 * h, start);
-    if (!start.memory.empty()) rule.guess.add(0.125 * h * h, start.memory[0]);
+    rule.guess.add(0.125 * h * h, start.memory[0]);
+    if (start.strains.empty()) return rule;
+    // Along the chord from the start to the middle strains change with the square of the motion, too, of which the rate in the middle has twice as
+    // much: what is missing was, in the last step, half of the difference between the strain at its end and that as far beyond its middle.
+    rule.damping_memory = -0.5 * std::pow(h / start.last_dt, 2);
+    rule.strains = &start.strains;
     return rule;
   }
 
-  /// h^3/12 x''', by the accelerations of this step and the last.
+  /// h^3/12 x''', by the accelerations in the middles of this step and the last; of the first, in its middle and at its start.
   Combination error(const State &start, double h, const Stages &done) const override {
-    if (start.memory.empty()) return {};
     const double third = h * h * h / 12 / (0.5 * (h + start.last_dt));
     return Combination().add(third, done[0].acceleration).add(-third, start.memory[0]);
   }
