@@ -126,7 +126,8 @@ void carryFrames(const StageRule &rule, const State &start, const Elements &elem
     const Vec3 next = place(i + 1), edge = next - here;
     const Frame f = from.frameAt(rod.slot(i));
     const Vec3 tangent = edge.normalized();
-    if (f.tangent.dot(tangent) > 0.1) reference.setFrame(rod.slot(i), {tangent, orthonormalised(transport<double>(f.director, f.tangent, tangent), tangent), f.length});
+    if (f.tangent.dot(tangent) > 0.1)
+      reference.setFrame(rod.slot(i), {tangent, orthonormalised(transport<double>(f.director, f.tangent, tangent), tangent), f.length});
     here = next;
   }
 }
@@ -139,7 +140,8 @@ std::vector<double> strainsOf(const Elements &elements, const Configuration &c) 
     forCells(elements, r, [&]<class T>(const LooseCell &cell, int count) {
       const auto [f0, f1] = cellFrames<T>(c, cell, count);
       const CellOf<T> constants = cellOf<T>(elements.cells(), c, cell.slot);
-      const std::array<T, 3> s = elements.measure[r] == Measure::tan ? cellStrain<Measure::tan>(f0, f1, constants) : cellStrain<Measure::angle>(f0, f1, constants);
+      const std::array<T, 3> s =
+          elements.measure[r] == Measure::tan ? cellStrain<Measure::tan>(f0, f1, constants) : cellStrain<Measure::angle>(f0, f1, constants);
       for (int k = 0; k < 3; ++k) write(strains.data() + (k + 1) * row + cell.slot, s[k]);
     });
   return strains;

@@ -67,10 +67,12 @@ PetscErrorCode TimeLoop::solveStages(const State &start, const Step &step, Newto
 void TimeLoop::finishStages(State &state, double h) {
   const IncrementalPotential &potential = solver_.potential();
   const Scene &scene = potential.scene();
-  const bool keeps = integrator_->remembersStrains() && std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &rod) { return rod.material.stiffness_damping_coefficient != 0; });
+  const bool keeps = integrator_->remembersStrains() &&
+                     std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &rod) { return rod.material.stiffness_damping_coefficient != 0; });
   if (keeps) state.strains = strainsOf(potential.elements(), potential.start());
   if (keeps && !integrator_->endsAtStage()) // as far beyond the middle
-    std::transform(state.strains.begin(), state.strains.end(), stages_.back().strains.begin(), state.strains.begin(), [](double start, double middle) { return 2 * middle - start; });
+    std::transform(state.strains.begin(), state.strains.end(), stages_.back().strains.begin(), state.strains.begin(),
+                   [](double start, double middle) { return 2 * middle - start; });
   integrator_->finish(state, h, stages_);
   if (!state.memory.empty()) state.last_dt = h;
   if (integrator_->order() == 1) return; // its velocities are chords everywhere

@@ -42,7 +42,8 @@ void writeCheckpoint(const std::string &path, const State &state, const StepCont
       file.write("memory_edge_" + std::to_string(k), {state.memory[k].edge.size()}, state.memory[k].edge.data());
     }
     if (!state.strains.empty()) file.write("strains", {state.strains.size()}, state.strains.data());
-    const double loop[] = {state.time, double(state.step), control.dt, double(control.good), double(control.stable), control.error, control.error_sum, state.last_dt, code(integrator)};
+    const double loop[] = {state.time,    double(state.step), control.dt,    double(control.good), double(control.stable),
+                           control.error, control.error_sum,  state.last_dt, code(integrator)};
     file.write("loop", {std::size(loop)}, loop);
   }
   std::error_code error;
@@ -55,8 +56,8 @@ void readCheckpoint(const std::string &path, State *state, StepControl *control,
   eachArray(*state, [&](const char *name, auto &values, hsize_t columns) {
     const std::vector<double> read = file.read(name, columns);
     if (read.size() != values.size() * columns)
-      throw SceneError(path + ": '" + name + "' has " + std::to_string(read.size() / columns) + " entries, but the scene needs " + std::to_string(values.size()) +
-                       "; restart with the scene that wrote the checkpoint");
+      throw SceneError(path + ": '" + name + "' has " + std::to_string(read.size() / columns) + " entries, but the scene needs " +
+                       std::to_string(values.size()) + "; restart with the scene that wrote the checkpoint");
     std::copy(read.begin(), read.end(), reinterpret_cast<double *>(values.data()));
   });
   const std::vector<double> loop = file.read("loop", 1);

@@ -261,7 +261,8 @@ TEST(TimeLoop, RestoresTheMemoryWhenAStepFails) {
     settings.dt_min = 0.02;
     TimeLoop loop(sim.solver, settings);
     bool finished = true;
-    EXPECT_PETSC(loop.run(sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+    EXPECT_PETSC(loop.run(
+        sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
     EXPECT_FALSE(finished);
     EXPECT_TRUE(sim.state == before) << name;
   }
@@ -309,10 +310,12 @@ TEST(Adaptation, LandsOnTheTimesOfFrames) {
 TEST(Integrator, IterationsDoNotGrowWithTheAxialStiffness) {
   for (const std::string &name : integratorNames())
     for (const double axial : {1e8, 1e12})
-      EXPECT_LE(swing(with(name, 0.01, 0.4), axial).iterations, (name == "midpoint" ? 2.5 : 1.2) * swing(with(name, 0.01, 0.4), 1e4).iterations) << name << " " << axial;
+      EXPECT_LE(swing(with(name, 0.01, 0.4), axial).iterations, (name == "midpoint" ? 2.5 : 1.2) * swing(with(name, 0.01, 0.4), 1e4).iterations)
+          << name << " " << axial;
 }
 
-/// The released cantilever against a Legendre-Galerkin solution (data/reference), at 5 ms: the figures are those measured with 50 edges, with a margin of a half.
+/// The released cantilever against a Legendre-Galerkin solution (data/reference), at 5 ms: the figures are those measured with 50 edges, with a margin of a
+/// half.
 TEST(Integrator, FollowsTheReleasedCantilever) {
   const std::map<std::string, double> largest{{"euler", 0.1}, {"bdf2", 8e-3}, {"sdirk2", 5e-3}, {"midpoint", 5e-3}, {"generalized_alpha", 5e-3}};
   Rod rod = straightRod(50);

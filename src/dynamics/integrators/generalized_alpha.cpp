@@ -1,4 +1,5 @@
-/// Generalized-alpha (Chung and Hulbert 1993) with forces in balance at the ends of steps (Arnold and Bruels 2007). Accelerations a of the motion and A of the method:
+/// Generalized-alpha (Chung and Hulbert 1993) with forces in balance at the ends of steps (Arnold and Bruels 2007). Accelerations a of the motion and A of the
+/// method:
 ///   (1 - am) A_n+1 + am A_n = (1 - af) a_n+1 + af a_n
 ///   d = h v_n + h^2 ((1/2 - b) A_n + b A_n+1),   v_n+1 = v_n + h ((1 - c) A_n + c A_n+1)
 /// am = (2 rho - 1)/(rho + 1), af = rho/(rho + 1), c = 1/2 - am + af, b = (1 - am + af)^2/4. A lags behind a by (af - am) h.

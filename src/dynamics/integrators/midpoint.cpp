@@ -1,5 +1,5 @@
-/// Implicit midpoint: v = d/(h/2), a = (v - v_n)/(h/2) in the middle of the step; its end lies as far beyond, v_n+1 = 2 v - v_n. Keeps linear momentum and what is
-/// quadratic in the motion; the energy stays within a band. Nothing damps stiff motions.
+/// Implicit midpoint: v = d/(h/2), a = (v - v_n)/(h/2) in the middle of the step; its end lies as far beyond, v_n+1 = 2 v - v_n. Keeps linear momentum and what
+/// is quadratic in the motion; the energy stays within a band. Nothing damps stiff motions.
 #include "tendril/dynamics/integrator.hpp"
 
 namespace tendril {
