@@ -14,8 +14,8 @@ struct Entry {
 };
 constexpr Entry entries[] = {
     {"euler", "backward Euler, first order, most dissipative", makeEuler},
-    {"bdf2", "second order, L-stable, most accurate per solve on stiff rods", makeBdf2},
-    {"sdirk2", "second order, L-stable, two solves a step", makeSdirk2},
+    {"bdf2", "second order, L-stable, keeps its order on stiff rods", makeBdf2},
+    {"sdirk2", "second order, L-stable, two solves a step, first order on stiff rods", makeSdirk2},
     {"midpoint", "second order, keeps the energy within a band, damps nothing", makeMidpoint},
     {"generalized_alpha", "second order, damps high frequencies by -rho_inf", makeGeneralizedAlpha},
 };
