@@ -34,10 +34,11 @@ IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, con
       start_(elements.slots), known_(elements.rods.size(), Known::nothing) {
   for (std::size_t r = 0; r < elements.rods.size(); ++r) {
     const RodRange &rod = elements.rods[r];
-    double sum = 0, shortest = HUGE_VAL, bending = 0, cell = HUGE_VAL;
+    double sum = 0, shortest = HUGE_VAL, longest = 0, bending = 0, cell = HUGE_VAL;
     for (int s = rod.first_slot; s < rod.edgeEnd(); ++s) {
       sum += elements.restLength()[s];
       shortest = std::min(shortest, elements.restLength()[s]);
+      longest = std::max(longest, elements.restLength()[s]);
     }
     for (int n = elements.rod_cells[r]; n < elements.rod_cells[r + 1]; ++n) {
       cell = std::min(cell, elements.cellLength()[elements.cell_slot[n]]);
@@ -45,6 +46,7 @@ IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, con
     }
     length_.push_back(sum);
     shortest_.push_back(shortest);
+    longest_.push_back(longest);
     bending_.push_back(bending);
     shortest_cell_.push_back(cell);
   }
@@ -57,13 +59,16 @@ void IncrementalPotential::beginStep(const State &start, const Step &step) {
   step_ = step;
   setSupports(scene_, elements_, start.time, start_);
   if (iterate_.empty()) iterate_ = start_;
-  turnSupports();
+  if (step.rule && reference_.empty()) reference_ = start_;
+  step_.twist_reference = step.rule ? &reference_ : nullptr;
+  turnSupports(start_, start_time_);
   retraction_.setInverseTimeSquared(step.isStatic() ? 0 : 1 / (step.dt * step.dt));
 }
 
 void IncrementalPotential::beginRod(const State &start, int r) {
   setRod(start, elements_, r, start_);
   iterate_.copyRod(elements_, r, start_);
+  if (step_.rule) carryFrames(*step_.rule, start, elements_, r, start_, reference_);
   axial_.beginStep(start_, step_, r);
   for (auto &term : terms_) term->beginStep(start, start_, step_, r);
   followSupports(r);
@@ -94,19 +99,19 @@ double IncrementalPotential::forceScale(const State &start, int r) const {
   return momentum > 0 ? std::min(scale, momentum / step_.dt) : scale;
 }
 
-/// Supports' frames to the end of the step.
-void IncrementalPotential::turnSupports() {
+/// Supports' frames to the time of the step.
+void IncrementalPotential::turnSupports(const Configuration &from, double from_time) {
   beyond_barrier_ = false;
   turned_.clear();
   for (std::size_t s = 0; s < scene_.supports.size(); ++s) {
     const int slot = elements_.support_slot[s];
     const Motion &motion = scene_.supports[s].motion;
     if (slot < 0 || !motion.moves()) continue;
-    Turned turned{scene_.supports[s].rod, slot, 0.0, start_.frameAt(slot)};
+    Turned turned{scene_.supports[s].rod, slot, 0.0, from.frameAt(slot)};
     // In parts of less than half a radian, so that whole turns within the step are counted.
-    const int parts = 1 + int(2 * (motion.rotationVectorAt(step_.time) - motion.rotationVectorAt(start_time_)).norm());
+    const int parts = 1 + int(2 * (motion.rotationVectorAt(step_.time) - motion.rotationVectorAt(from_time)).norm());
     for (int k = 1; k <= parts; ++k) {
-      const double time = k == parts ? step_.time : start_time_ + (step_.time - start_time_) * k / parts;
+      const double time = k == parts ? step_.time : from_time + (step_.time - from_time) * k / parts;
       const Frame now = supportFrame(scene_.supports[s], time);
       turned.angle += halfAngleBetween(turned.end, now).angle();
       turned.end = now;
@@ -216,6 +221,7 @@ double IncrementalPotential::energy(const Configuration &configuration, RodSet r
 }
 
 void IncrementalPotential::assembleRod(int r, HessianKind hessian) {
+  if (r < focus_.begin || r >= focus_.end) focus(all());
   const RodRange &rod = elements_.rods[r];
   Derivatives &d = derivatives_;
   for (int a = 0; a < slot_size; ++a)
@@ -274,6 +280,10 @@ bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r,
     const Vector3<Pack> de = readVector<Pack>(increment, 0, i + 1) - readVector<Pack>(increment, 0, i), t = readVector<Pack>(iterate_.values(), C::tangent, i);
     Pack change = read<Pack>(iterate_[C::length] + i) * t.dot(de);
     if (kind == RetractionKind::continued) change -= Pack(0.5) * de.squaredNorm();
+    if (kind == RetractionKind::kept) { // as is the force
+      write(trial[C::axial_force] + i, force);
+      continue;
+    }
     const Pack strain = read<Pack>(iterate_[C::strain] + i) + change * inverse * inverse;
     write(trial[C::axial_force] + i, Pack(force + Pack(scale) * (stiffness * (strain - rest) - force)));
   }
@@ -351,8 +361,10 @@ IncrementalPotential::Residual IncrementalPotential::residual(int r, const RodEn
   result.force = std::sqrt(force) / scale;
   result.moment = std::sqrt(moment) / (scale * length_[r]);
   result.compatibility = step_.mixed ? hmax(error) : 0;
-  result.force_floor = 4 * count * strain_noise * (stretching + (m.isCable() ? 0 : bending / shortest_[r])) / scale;
-  if (!m.isCable()) result.moment_floor = 4 * count * strain_noise * bending / (scale * length_[r]);
+  // Inertia turns an error of position or twist into a force or a moment, which counts in short steps.
+  const double inertia = step_.isStatic() ? 0 : longest_[r] / (step_.dt * step_.dt), heavy = m.linear_density * shortest_[r] * inertia, spinning = m.linear_rotational_inertia * inertia;
+  result.force_floor = 4 * count * strain_noise * (stretching + heavy + (m.isCable() ? 0 : bending / shortest_[r])) / scale;
+  if (!m.isCable()) result.moment_floor = 4 * count * strain_noise * (bending + spinning) / (scale * length_[r]);
   result.compatibility_floor = 16 * strain_noise;
   return result;
 }
@@ -368,27 +380,90 @@ IncrementalPotential::Residual IncrementalPotential::residual() {
   return worst;
 }
 
-[[gnu::flatten]] void IncrementalPotential::commit(State &state, RodSet rods) const {
-  const double rate = step_.isStatic() ? 0 : 1 / step_.dt;
+[[gnu::flatten]] StageRates IncrementalPotential::stageRates(const StageRule &rule, bool with_strains) const {
+  StageRates rates;
+  for (Rates *part : {&rates.displacement, &rates.velocity, &rates.acceleration}) {
+    part->vertex.resize(elements_.vertices());
+    part->edge.resize(elements_.edges());
+  }
+  const double rate = 1 / step_.dt;
+  for (const RodRange &rod : elements_.rods) {
+    for (int i = 0; i < rod.vertices; ++i) {
+      const int v = rod.first_vertex + i;
+      const Vec3 d = iterate_.positionAt(rod.slot(i)) - start_.positionAt(rod.slot(i)), velocity = d * rate + rule.velocity.atVertex(v);
+      rates.displacement.vertex[v] = d;
+      rates.velocity.vertex[v] = velocity;
+      rates.acceleration.vertex[v] = (rule.mass * velocity + rule.acceleration.atVertex(v)) * rate;
+    }
+    for (int i = 0; i < rod.edges; i += lanes) {
+      const Pack spun = spinOver(twistReference(), iterate_, rod.slot(i)).total;
+      for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) {
+        const int e = rod.first_edge + i + l;
+        const double d = spun[l], velocity = d * rate + rule.velocity.atEdge(e);
+        rates.displacement.edge[e] = d;
+        rates.velocity.edge[e] = velocity;
+        rates.acceleration.edge[e] = (rule.mass * velocity + rule.acceleration.atEdge(e)) * rate;
+      }
+    }
+  }
+  if (with_strains) rates.strains = strainsOf(elements_, iterate_);
+  return rates;
+}
+
+/// An edge at the start, in the middle and at the end lies in one plane, so that the minimal rotations of the two halves make up that of the whole
+/// step: its spin over the step is twice that over its half, with no holonomy between.
+bool IncrementalPotential::moveOn(double time) {
+  Planes increment = dofs_.makePlanes();
+  Configuration trial;
+  const double middle = step_.time;
+  step_.time = time;
+  turnSupports(iterate_, middle);
+  for (int r = 0; r < all().end; ++r) {
+    const RodRange &rod = elements_.rods[r];
+    for (int i = 0; i < rod.vertices; ++i) increment.setVector(0, rod.slot(i), iterate_.positionAt(rod.slot(i)) - start_.positionAt(rod.slot(i)));
+    for (int i = 0; rod.twist && i < rod.edges; i += lanes) {
+      const Pack spun = spinOver(twistReference(), iterate_, rod.slot(i)).total;
+      for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) increment[3][rod.slot(i + l)] = spun[l];
+    }
+    dofs_.copyBehindRing(rod, increment);
+  }
+  remainingMotion(all(), increment);
+  for (int r = 0; r < all().end; ++r) {
+    followSupports(r);
+    if (!tryMove(increment, 1, r, RetractionKind::additive, trial)) return false;
+    accept(trial, r);
+    const RodRange &rod = elements_.rods[r];
+    for (int s = rod.first_slot; s < rod.edgeEnd(); ++s) iterate_[C::axial_force][s] = elements_.axialStiffness()[s] * iterate_[C::strain][s];
+  }
+  return !beyond_barrier_;
+}
+
+void IncrementalPotential::commit(State &state, RodSet rods) const {
+  for (int r = rods.begin; r < rods.end && !step_.isStatic(); ++r) {
+    const RodRange &rod = elements_.rods[r];
+    const double rate = 1 / step_.dt;
+    for (int i = 0; i < rod.vertices; ++i) state.velocity[rod.first_vertex + i] = (iterate_.positionAt(rod.slot(i)) - start_.positionAt(rod.slot(i))) * rate;
+    for (int i = 0; i < rod.edges; i += lanes) {
+      const Pack spun = spinOver(start_, iterate_, rod.slot(i)).total * Pack(rate);
+      for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) state.twist_rate[rod.first_edge + i + l] = spun[l];
+    }
+  }
+  commitConfiguration(state, rods);
+}
+
+[[gnu::flatten]] void IncrementalPotential::commitConfiguration(State &state, RodSet rods) const {
   for (int r = rods.begin; r < rods.end; ++r) {
     const RodRange &rod = elements_.rods[r];
     for (int n = elements_.rod_cells[r]; n < elements_.rod_cells[r + 1]; ++n) state.turns[n] = iterate_[C::turns][elements_.cell_slot[n]];
-    for (int i = 0; i < rod.vertices; ++i) {
-      const int v = rod.first_vertex + i;
-      const Vec3 x = iterate_.positionAt(rod.slot(i));
-      if (!step_.isStatic()) state.velocity[v] = (x - start_.positionAt(rod.slot(i))) * rate;
-      state.position[v] = x;
-    }
+    for (int i = 0; i < rod.vertices; ++i) state.position[rod.first_vertex + i] = iterate_.positionAt(rod.slot(i));
     for (int i = 0; i < rod.edges; i += lanes) {
       const int slot = rod.slot(i), live = std::min(lanes, rod.edges - i);
       const FrameOf<Pack> f = iterate_.frames<Pack>(slot);
       const Vector3<Pack> d = orthonormalised<Pack>(f.director, f.tangent);
-      const Pack spun = step_.isStatic() ? Pack(0.0) : spinOver(start_, iterate_, slot).total * Pack(rate);
       for (int l = 0; l < live; ++l) {
         const int e = rod.first_edge + i + l;
         state.director[e] = Vec3(d[0][l], d[1][l], d[2][l]);
         state.axial_force[e] = iterate_[C::axial_force][slot + l];
-        if (!step_.isStatic()) state.twist_rate[e] = spun[l];
       }
     }
   }

@@ -1,4 +1,4 @@
-#include "tendril/dynamics/state.hpp"
+#include "tendril/dynamics/stage.hpp"
 
 #include "tendril/energy/edge.hpp"
 
@@ -112,6 +112,39 @@ void setSupports(const Scene &scene, const Elements &elements, double motion_tim
     const auto frames = cellFrames<T>(c, cell, count);
     write(c[C::twist] + cell.slot, T(halfAngleBetween(frames[0], frames[1]).angle() + read<T>(c[C::turns] + cell.slot)));
   });
+}
+
+void carryFrames(const StageRule &rule, const State &start, const Elements &elements, int r, const Configuration &from, Configuration &reference) {
+  const RodRange &rod = elements.rods[r];
+  reference.copyRod(elements, r, from);
+  auto place = [&](int i) {
+    const int v = rod.first_vertex + (i == rod.vertices ? 0 : i);
+    return Vec3(start.position[v] + elements.freedom()[elements.vertex_slot[v]] * rule.guess.atVertex(v));
+  };
+  Vec3 here = place(0);
+  for (int i = 0; rod.twist && i < rod.edges; ++i) {
+    const Vec3 next = place(i + 1), edge = next - here;
+    const Frame f = from.frameAt(rod.slot(i));
+    const Vec3 tangent = edge.normalized();
+    if (f.tangent.dot(tangent) > 0.1)
+      reference.setFrame(rod.slot(i), {tangent, orthonormalised(transport<double>(f.director, f.tangent, tangent), tangent), f.length});
+    here = next;
+  }
+}
+
+std::vector<double> strainsOf(const Elements &elements, const Configuration &c) {
+  const std::size_t row = strainRow(elements);
+  std::vector<double> strains(4 * row, 0.0);
+  for (const int s : elements.edge_slot) strains[s] = c[Configuration::strain][s];
+  for (int r = 0; r < int(elements.rods.size()); ++r)
+    forCells(elements, r, [&]<class T>(const LooseCell &cell, int count) {
+      const auto [f0, f1] = cellFrames<T>(c, cell, count);
+      const CellOf<T> constants = cellOf<T>(elements.cells(), c, cell.slot);
+      const std::array<T, 3> s =
+          elements.measure[r] == Measure::tan ? cellStrain<Measure::tan>(f0, f1, constants) : cellStrain<Measure::angle>(f0, f1, constants);
+      for (int k = 0; k < 3; ++k) write(strains.data() + (k + 1) * row + cell.slot, s[k]);
+    });
+  return strains;
 }
 
 Configuration configurationOf(const State &state, const Scene &scene, const Elements &elements, double motion_time) {

@@ -31,31 +31,154 @@ PetscErrorCode TimeLoop::locate(State &start, const Step &step, bool *stop) {
   PetscFunctionReturn(0);
 }
 
+/// Solves the stages of a step one after the other; the potential's iterate is the end of the step then. The state is not touched.
+PetscErrorCode TimeLoop::solveStages(const State &start, const Step &step, NewtonReport *report) {
+  PetscFunctionBeginUser;
+  IncrementalPotential &potential = solver_.potential();
+  const std::vector<Rod> &rods = potential.scene().rods;
+  const bool dissipates = std::any_of(rods.begin(), rods.end(), [](const Rod &rod) { return rod.material.stiffness_damping_coefficient != 0; });
+  const int count = integrator_->stages(start);
+  stages_.clear();
+  stages_.reserve(count);
+  for (int k = 0; k < count; ++k) {
+    const StageRule rule = integrator_->stage(start, step.dt, stages_);
+    Step stage = step;
+    stage.dt = rule.dt;
+    stage.rule = settings_.integrator.name == "euler" ? nullptr : &rule;
+    if (rule.fraction != 1) stage.time = start.time + rule.fraction * step.dt;
+    NewtonReport one;
+    PetscCall(solver_.solve(start, stage, &one));
+    one.iterations += report->iterations; // stages follow each other; blocks of rods do not
+    report->include(one);
+    report->converged = one.converged;
+    report->reason = one.reason;
+    report->negative_pivots = one.negative_pivots;
+    if (!one.converged) PetscFunctionReturn(0);
+    stages_.push_back(potential.stageRates(rule, dissipates && (k + 1 < count || !integrator_->endsAtStage())));
+  }
+  if (!integrator_->endsAtStage() && !potential.moveOn(step.time)) {
+    report->converged = false;
+    report->reason = "the end of the step, as far beyond its middle, is not a possible configuration";
+  }
+  PetscFunctionReturn(0);
+}
+
+/// Velocities and memory of the state; held vertices have those of their supports.
+void TimeLoop::finishStages(State &state, double h) {
+  const IncrementalPotential &potential = solver_.potential();
+  const Scene &scene = potential.scene();
+  const bool keeps = integrator_->remembersStrains() &&
+                     std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &rod) { return rod.material.stiffness_damping_coefficient != 0; });
+  if (keeps) state.strains = strainsOf(potential.elements(), potential.start());
+  if (keeps && !integrator_->endsAtStage()) // as far beyond the middle
+    std::transform(state.strains.begin(), state.strains.end(), stages_.back().strains.begin(), state.strains.begin(),
+                   [](double start, double middle) { return 2 * middle - start; });
+  integrator_->finish(state, h, stages_);
+  if (!state.memory.empty()) state.last_dt = h;
+  if (integrator_->order() == 1) return; // its velocities are chords everywhere
+  for (const Support &support : scene.supports) {
+    if (!support.holdsPosition()) continue;
+    const int v = potential.elements().rods[support.rod].first_vertex + support.vertex;
+    state.velocity[v] = support.motion.velocityAt(potential.step().time);
+    for (Rates &rates : state.memory) rates.vertex[v].setZero();
+  }
+}
+
+TimeLoop::StepError TimeLoop::stepError(const State &start, double h) const {
+  StepError worst;
+  const Combination error = integrator_->error(start, h, stages_);
+  worst.known = !error.empty();
+  const IncrementalPotential &potential = solver_.potential();
+  for (std::size_t r = 0; worst.known && r < potential.elements().rods.size(); ++r) {
+    const RodRange &rod = potential.elements().rods[r];
+    double wrong = 0, moved = 0, turned_wrong = 0, turned = 0;
+    for (int v = rod.first_vertex; v < rod.first_vertex + rod.vertices; ++v) {
+      if (potential.elements().freedom()[potential.elements().vertex_slot[v]] == 0) continue;
+      wrong += error.atVertex(v).squaredNorm();
+      moved += (potential.iterate().positionAt(potential.elements().vertex_slot[v]) - start.position[v]).squaredNorm();
+    }
+    for (int e = rod.first_edge; rod.twist && e < rod.first_edge + rod.edges; ++e) {
+      turned_wrong += std::pow(error.atEdge(e), 2);
+      turned += std::pow(stages_.back().displacement.edge[e], 2);
+    }
+    const double length = std::max(potential.length(int(r)), 1e-300);
+    auto norm = [&](double positions, double twists) { return std::sqrt(positions / (length * length * rod.vertices) + twists / rod.edges); };
+    worst.error = std::max(worst.error, norm(wrong, turned_wrong));
+    worst.moved = std::max(worst.moved, norm(moved, turned));
+  }
+  return worst;
+}
+
+/// Length of the next step [s]: no sliver is left before the end, nor before a time at which adapted steps have to end.
+double TimeLoop::nextStep(double time, double *landing) const {
+  *landing = settings_.t_end;
+  if (settings_.adapt == Adaptation::none) return std::min(control.dt, settings_.t_end - time);
+  const double interval = settings_.output_interval;
+  if (interval > 0) *landing = std::min(settings_.t_end, interval * (1 + std::floor(time / interval * (1 + 1e-12))));
+  const double left = *landing - time, parts = std::max(1.0, std::ceil(left / control.dt * (1 - 1e-9)));
+  return left / parts;
+}
+
+/// Proportional-integral control of the step (Gustafsson, Lundh and Soederlind 1988): sets the next one, and tells whether this one is good enough.
+bool TimeLoop::adapt(double h, double dt_min, const StepError &error) {
+  if (!error.known) return true;
+  const double power = 1.0 / (integrator_->order() + 1);
+  const double ratio = std::max(error.error / (settings_.dt_atol + settings_.dt_rtol * error.moved), 1e-10);
+  const bool accept = ratio <= 1 || h <= dt_min * (1 + 1e-9);
+  double factor = std::clamp(0.9 * std::pow(ratio, -power), 0.1, 0.9);
+  if (ratio <= 1) factor = std::clamp(0.9 * std::pow(ratio, -0.7 * power) * std::pow(control.error > 0 ? control.error : ratio, 0.4 * power), 0.5, 2.0);
+  double next = factor * h;
+  if (accept && factor >= 1) next = std::max(next, control.dt); // a step cut short to land says nothing against the length asked for
+  if (settings_.dt_max > 0) next = std::min(next, settings_.dt_max);
+  control.dt = std::max(next, dt_min);
+  if (accept) control.error = ratio;
+  return accept;
+}
+
 PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finished) {
   PetscFunctionBeginUser;
-  const IncrementalPotential &potential = solver_.potential();
+  IncrementalPotential &potential = solver_.potential();
   const double dt_min = settings_.dt_min > 0 ? settings_.dt_min : settings_.dt / 1024;
-  if (control.dt == 0) control.dt = settings_.dt;
-  auto &[dt, good, stable] = control;
+  const bool adapts = settings_.dynamic && settings_.adapt == Adaptation::error;
+  if (control.dt == 0) control.dt = adapts && settings_.dt_max > 0 ? std::min(settings_.dt, settings_.dt_max) : settings_.dt;
+  double &dt = control.dt;
+  int &good = control.good;
+  bool &stable = control.stable;
+  if (settings_.dynamic && state.memory.empty()) PetscCall(integrator_->begin(solver_, dt, state));
   int rejected = 0;
   PetscLogDouble begin, now;
   PetscCall(PetscTime(&begin));
   EnergyBudget before = energyBudget(potential.scene(), potential.elements(), state, settings_.dynamic ? 1 : state.time);
   *finished = false;
+  const bool plain = !settings_.dynamic || (settings_.integrator.name == "euler" && !adapts && !settings_.estimate_error);
   State next = state; // what the blocks that have converged come to; the state itself stays as it is until all have
   EnergyBudget energy;
   while (state.time < settings_.t_end) {
-    const double h = std::min(dt, settings_.t_end - state.time);
-    const Step step = stepOf(settings_, state, h);
+    double landing;
+    const double h = nextStep(state.time, &landing);
+    Step step = stepOf(settings_, state, h);
+    if (adapts && std::abs(step.time - landing) < 1e-9 * h) step.time = landing;
     NewtonReport report;
     energy = {};
-    solver_.on_block = [&](RodSet rods) {
-      potential.commit(next, rods);
-      for (int r = rods.begin; r < rods.end; ++r)
-        energy += energyBudget(potential.scene(), potential.elements(), next, potential.iterate(), settings_.dynamic ? 1 : step.time, r);
+    auto addEnergy = [&](const State &end, int r) {
+      energy += energyBudget(potential.scene(), potential.elements(), end, potential.iterate(), settings_.dynamic ? 1 : step.time, r);
     };
-    PetscCall(solver_.solve(state, step, &report));
-    solver_.on_block = nullptr;
+    StepError error;
+    if (plain) { // each block is committed while it is in the cache
+      solver_.on_block = [&](RodSet rods) {
+        potential.commit(next, rods);
+        for (int r = rods.begin; r < rods.end; ++r) addEnergy(next, r);
+      };
+      PetscCall(solver_.solve(state, step, &report));
+      solver_.on_block = nullptr;
+    } else {
+      PetscCall(solveStages(state, step, &report));
+      if (report.converged && (adapts || settings_.estimate_error)) error = stepError(state, h);
+      if (report.converged && adapts && !adapt(h, dt_min, error)) { // the state was not touched
+        ++rejected;
+        continue;
+      }
+    }
     // Couples have no potential: the inertia of the symmetric part says nothing about stability.
     const bool detects = !settings_.dynamic && settings_.bifurcation != Bifurcation::off && potential.scene().moments.empty();
     if (detects && stable && report.first_negative_pivots > 0 && located_ <= state.time) {
@@ -64,10 +187,15 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
       *finished = stop;
       if (stop) PetscFunctionReturn(0);
     }
-    if (report.converged) {
+    if (report.converged && plain) {
       next.time = step.time;
       next.step = state.step + 1;
       std::swap(state, next);
+    } else if (report.converged) {
+      finishStages(state, h);
+      potential.commitConfiguration(state);
+      for (int r = 0; r < potential.all().end; ++r) addEnergy(state, r);
+      control.error_sum += error.error;
     }
     if (!report.converged) { // the state was not touched
       ++rejected;
@@ -84,7 +212,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     stable = report.negative_pivots == 0;
     if (!settings_.dynamic && report.iterations <= 4 && report.escapes == 0) // load steps grow where they are easy
       dt = std::min(2 * dt, 4 * settings_.dt);
-    else if (dt < settings_.dt && ++good >= 4) {
+    else if (!adapts && dt < settings_.dt && ++good >= 4) {
       dt = std::min(2 * dt, settings_.dt);
       good = 0;
     }
@@ -100,6 +228,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     row.rejected_steps = rejected;
     PetscCall(PetscTime(&now));
     row.wall_seconds = now - begin;
+    row.error_estimate = control.error_sum;
     rejected = 0;
     PetscCall(observe(state, row));
   }

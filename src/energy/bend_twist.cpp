@@ -9,16 +9,16 @@ public:
   BendTwist(const Scene &scene, const Elements &elements) : scene_(scene), elements_(elements), cells_(elements.cells()) {}
 
   /// Dissipation proportional to stiffness is a second quadratic in the same strains: stiffness k and rest r with damping ratio
-  /// q = beta/dt around the strain s at the start combine into stiffness k (1 + q) and rest (r + q s)/(1 + q).
+  /// q = beta/dt around the strain s at the start (dampedRest) combine into stiffness k (1 + q) and rest (r + q s)/(1 + q).
   void beginStep(const State &, const Configuration &start, const Step &step, int r) override {
     const double beta = scene_.rods[r].material.stiffness_damping_coefficient;
     if (beta == 0) return;
-    const double q = step.isStatic() ? 0 : beta / step.dt;
+    const double q = step.isStatic() ? 0 : beta / step.dampingDt();
     forCells(elements_, r, [&]<class T>(const LooseCell &cell, int count) {
       const std::array<T, 3> s = presentStrain<T>(elements_, start, r, cell, count);
       for (int k = 0; k < 3; ++k) {
         write(cells_[cell_stiffness + k] + cell.slot, T(read<T>(elements_.cells()[cell_stiffness + k] + cell.slot) * T(1 + q)));
-        write(cells_[cell_rest + k] + cell.slot, T((read<T>(elements_.cells()[cell_rest + k] + cell.slot) + T(q) * s[k]) / T(1 + q)));
+        write(cells_[cell_rest + k] + cell.slot, T((read<T>(elements_.cells()[cell_rest + k] + cell.slot) + T(q) * dampedRest(step, s[k], (k + 1) * strainRow(elements_) + cell.slot)) / T(1 + q)));
       }
     });
   }

@@ -1,4 +1,4 @@
-/// Inertia of a step of backward Euler with dissipation proportional to mass: sum of weight/2 |q - predicted|^2 over positions and twists.
+/// Inertia of a stage of a time step with dissipation proportional to mass: sum of weight/2 |q - predicted|^2 over positions and twists.
 #include "tendril/energy/edge.hpp"
 #include "tendril/energy/term.hpp"
 
@@ -9,13 +9,26 @@ class Inertia final : public Term {
 public:
   Inertia(const Scene &scene, const Elements &elements) : scene_(scene), elements_(elements), predicted_(slot_size, elements.slots), weight_(scene.rods.size()) {}
 
-  /// m/(2 dt^2) |x - x_n - dt v_n|^2 + alpha m/(2 dt) |x - x_n|^2 as one quadratic; the same for the twist increment.
+  /// With v = d/dt + u and acceleration (mass v + b)/dt (StageRule), inertia and dissipation are m (mass/dt^2 + alpha/dt) (d - d_hat),
+  /// d_hat = -dt u - b dt/(mass + alpha dt); the same for the twist increment. Backward Euler has mass 1, u = 0 and b = -v_n.
   void beginStep(const State &state, const Configuration &start, const Step &step, int r) override {
-    start_ = &start;
+    start_ = step.twist_reference ? step.twist_reference : &start;
     const RodRange &rod = elements_.rods[r];
     const double alpha = scene_.rods[r].material.mass_damping_coefficient;
-    weight_[r] = 1 / (step.dt * step.dt) + alpha / step.dt;
-    const double reach = step.dt / (1 + alpha * step.dt);
+    const double mass = step.rule ? step.rule->mass : 1;
+    weight_[r] = mass / (step.dt * step.dt) + alpha / step.dt;
+    const double reach = step.dt / (mass + alpha * step.dt);
+    if (step.rule) {
+      for (int i = 0; i < rod.vertices; ++i) {
+        const int v = rod.first_vertex + i;
+        predicted_.setVector(0, rod.slot(i), state.position[v] - step.dt * step.rule->velocity.atVertex(v) - reach * step.rule->acceleration.atVertex(v));
+      }
+      for (int i = 0; i < rod.edges; ++i) {
+        const int e = rod.first_edge + i;
+        predicted_[3][rod.slot(i)] = -step.dt * step.rule->velocity.atEdge(e) - reach * step.rule->acceleration.atEdge(e);
+      }
+      return;
+    }
     for (int i = 0; i < rod.vertices; ++i)
       for (int a = 0; a < 3; ++a) predicted_[a][rod.slot(i)] = state.position[rod.first_vertex + i][a] + reach * state.velocity[rod.first_vertex + i][a];
     for (int i = 0; i < rod.edges; ++i) predicted_[3][rod.slot(i)] = reach * state.twist_rate[rod.first_edge + i];
@@ -77,7 +90,7 @@ public:
 private:
   const Scene &scene_;
   const Elements &elements_;
-  const Configuration *start_ = nullptr;
+  const Configuration *start_ = nullptr; ///< twist is measured from its frames
   Planes predicted_; ///< positions, and twists since the start
   std::vector<double> weight_;
 };

@@ -70,15 +70,15 @@ AxialLaw::AxialLaw(const Scene &scene, const Elements &elements) : scene_(scene)
   std::copy_n(elements.axialStiffness(), elements.slots, planes_[0]);
 }
 
-/// Dissipation as in the bending term: a second quadratic around the strain at the start.
+/// Dissipation as in the bending term: a second quadratic around the strain at the start (dampedRest).
 void AxialLaw::beginStep(const Configuration &start, const Step &step, int r) {
   const double beta = scene_.rods[r].material.stiffness_damping_coefficient;
   if (beta == 0) return;
-  const double q = step.isStatic() ? 0 : beta / step.dt;
+  const double q = step.isStatic() ? 0 : beta / step.dampingDt();
   const RodRange &rod = elements_.rods[r];
   for (int i = rod.first_slot; i < rod.edgeEnd(); ++i) {
     planes_[0][i] = elements_.axialStiffness()[i] * (1 + q);
-    planes_[1][i] = q / (1 + q) * start[Configuration::strain][i];
+    planes_[1][i] = q / (1 + q) * dampedRest(step, start[Configuration::strain][i], i);
   }
 }
 

@@ -32,6 +32,12 @@ const std::vector<Entry> &entries() {
         {"scene", "scene file (YAML)", "(required)"},
         {"mode", "dynamic: steps in time; static: steps in load to an equilibrium", "(from the scene) dynamic"},
         {"dt", "time step [s]", "(from the scene) 0.01"},
+        {"integrator", integratorMeanings(), "euler"},
+        {"rho_inf", "generalized_alpha: what is left of the highest frequencies after a step, 0 to 1", "0.8"},
+        {"dt_adapt", "none: steps of -dt; error: as long as the estimated error of a step allows, beginning with -dt (dynamic)", "none"},
+        {"dt_rtol", "-dt_adapt error: error of a step allowed, relative to what it moves", "1e-3"},
+        {"dt_atol", "-dt_adapt error: and in addition, relative to the length of the rod (twists in rad)", "1e-6"},
+        {"dt_max", "-dt_adapt error: largest step [s]", "(none)"},
         {"dt_min", "smallest step after rejections [s, or load factor]", "(dt/1024)"},
         {"t_end", "end time [s]", "(from the scene) 1"},
         {"load_steps", "equal steps of the load factor from 0 to 1 (static)", "(from the scene) 1"},
@@ -172,6 +178,20 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   if (texts.has("dt")) o->dt = texts.positive("dt");
   if (texts.has("t_end")) o->t_end = texts.positive("t_end");
   if (texts.has("dt_min")) o->loop.dt_min = texts.positive("dt_min");
+  if (texts.has("integrator")) o->loop.integrator.name = texts.oneOf("integrator", integratorNames());
+  if (texts.has("rho_inf")) {
+    o->loop.integrator.rho_inf = texts.number("rho_inf");
+    if (!(o->loop.integrator.rho_inf >= 0 && o->loop.integrator.rho_inf <= 1)) fail("rho_inf", "must be from 0 to 1, found '" + texts.at("rho_inf") + "'");
+    if (o->loop.integrator.name != "generalized_alpha") fail("rho_inf", "needs -integrator generalized_alpha");
+  }
+  if (texts.has("dt_adapt")) o->loop.adapt = texts.oneOf("dt_adapt", {"none", "error"}) == "error" ? Adaptation::error : Adaptation::none;
+  for (const auto &[name, target] : std::initializer_list<std::pair<const char *, double *>>{{"dt_rtol", &o->loop.dt_rtol}, {"dt_atol", &o->loop.dt_atol}, {"dt_max", &o->loop.dt_max}})
+    if (texts.has(name)) {
+      *target = texts.positive(name);
+      if (o->loop.adapt == Adaptation::none) fail(name, "needs -dt_adapt error");
+    }
+  for (const char *name : {"integrator", "dt_adapt"})
+    if (texts.has(name)) o->dynamic_only = name;
   if (texts.has("load_steps")) o->given_load_steps = texts.count("load_steps");
   if (texts.has("arclength_steps")) o->arclength_steps = texts.count("arclength_steps");
   if (texts.has("continuation")) o->continuation = texts.oneOf("continuation", {"load", "arclength"}) == "load" ? Continuation::load : Continuation::arclength;
@@ -187,6 +207,7 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   if (texts.has("output_dir")) o->output_dir = texts.at("output_dir");
   if (texts.has("output_interval")) {
     o->output_interval = texts.number("output_interval");
+    o->loop.output_interval = o->output_interval;
     if (o->output_interval < 0) fail("output_interval", "must not be negative, found '" + texts.at("output_interval") + "'");
   }
   if (texts.has("checkpoint_interval")) {
@@ -194,7 +215,7 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   }
   if (texts.has("restart")) o->restart = texts.at("restart");
   o->fields = readFields(texts);
-  if (texts.has("error_estimate")) o->error_estimate = texts.flag("error_estimate");
+  if (texts.has("error_estimate")) o->error_estimate = o->loop.estimate_error = texts.flag("error_estimate");
   if (texts.has("accuracy_of")) {
     const std::string q = texts.oneOf("accuracy_of", {"position", "tip", "energy"});
     o->accuracy_of = q == "tip" ? Quantity::tip : q == "energy" ? Quantity::energy : Quantity::position;
@@ -247,6 +268,7 @@ void resolve(const RunSettings &scene, Options &o) {
   } else {
     if (o.dt) fail("dt", "has no meaning in -mode static; use -load_steps");
     if (o.t_end) fail("t_end", "has no meaning in -mode static; the load factor ends at 1");
+    if (!o.dynamic_only.empty()) fail(o.dynamic_only, "has no meaning in -mode static");
     o.loop.t_end = 1;
     o.loop.dt = 1.0 / o.load_steps;
     const bool arclength = o.loop.continuation == Continuation::arclength;
@@ -295,6 +317,14 @@ void writeOptionsFile(const std::string &path, const Options &o, const Provenanc
   if (o.loop.dynamic) {
     put("dt", o.loop.dt);
     put("t_end", o.loop.t_end);
+    put("integrator", o.loop.integrator.name);
+    if (o.loop.integrator.name == "generalized_alpha") put("rho_inf", o.loop.integrator.rho_inf);
+    put("dt_adapt", o.loop.adapt == Adaptation::error ? "error" : "none");
+    if (o.loop.adapt == Adaptation::error) {
+      put("dt_rtol", o.loop.dt_rtol);
+      put("dt_atol", o.loop.dt_atol);
+      if (o.loop.dt_max > 0) put("dt_max", o.loop.dt_max);
+    }
   } else {
     put("load_steps", o.load_steps);
     put("continuation", o.loop.continuation == Continuation::load ? "load" : "arclength");

@@ -190,7 +190,7 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
   TimeLoop loop(run.solver, o.loop);
   if (!o.restart.empty()) {
     if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength) throw SceneError("option -restart: -continuation arclength cannot be taken up again");
-    readCheckpoint(o.restart, &run.state, &loop.control);
+    readCheckpoint(o.restart, &run.state, &loop.control, o.loop.integrator.name);
     std::error_code none;
     if (std::filesystem::equivalent(std::filesystem::absolute(o.restart).parent_path(), o.output_dir, none))
       throw SceneError("option -restart: the results would replace those beside the checkpoint '" + o.restart + "'; choose another -output_dir");
@@ -232,7 +232,7 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
     trajectory.flushWhenDue();
     if (o.checkpoint_interval > 0 && state.step % o.checkpoint_interval == 0) {
       trajectory.flush(); // a restart goes on where the frames end
-      writeCheckpoint(checkpoint, state, loop.control);
+      writeCheckpoint(checkpoint, state, loop.control, o.loop.integrator.name);
     }
     progress.step(row);
     if (!o.loop.dynamic && row.negative_pivots > 0 && !warned) {
@@ -268,7 +268,7 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
   }
   PetscCall(PetscLogEventBegin(events().output, 0, 0, 0, 0));
   trajectory.flush();
-  if (!arclength) writeCheckpoint(checkpoint, run.state, loop.control);
+  if (!arclength) writeCheckpoint(checkpoint, run.state, loop.control, o.loop.integrator.name);
   PetscCall(PetscLogEventEnd(events().output, 0, 0, 0, 0));
   PetscCall(PetscLogStagePop());
   std::ostringstream summary;

@@ -87,7 +87,8 @@ const std::vector<std::string> &Diagnostics::names() {
                                               "line_search_trials",
                                               "negative_pivots",
                                               "rejected_steps",
-                                              "wall_seconds"};
+                                              "wall_seconds",
+                                              "error_estimate"};
   return names;
 }
 
@@ -104,7 +105,8 @@ std::vector<double> Diagnostics::values() const {
           double(line_search_trials),
           double(negative_pivots),
           double(rejected_steps),
-          wall_seconds};
+          wall_seconds,
+          error_estimate};
 }
 
 TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene, const Elements &elements, const Provenance &provenance,

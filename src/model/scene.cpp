@@ -26,6 +26,13 @@ Vec3 interpolate(const std::vector<Motion::Key> &table, double time, Vec3 Motion
 
 Vec3 Motion::displacementAt(double time) const { return table.empty() ? Vec3(velocity * time) : interpolate(table, time, &Key::displacement); }
 
+Vec3 Motion::velocityAt(double time) const {
+  if (table.empty()) return velocity;
+  for (std::size_t k = 1; k < table.size(); ++k)
+    if (table[k - 1].time < time && time <= table[k].time) return (table[k].displacement - table[k - 1].displacement) / (table[k].time - table[k - 1].time);
+  return Vec3::Zero();
+}
+
 Vec3 Motion::rotationVectorAt(double time) const { return table.empty() ? Vec3(angular_velocity * time) : interpolate(table, time, &Key::rotation); }
 
 Mat3 Motion::rotationAt(double time) const {

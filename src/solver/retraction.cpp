@@ -57,6 +57,7 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
     const FrameOf<Pack> before = from.frames<Pack>(s);
     Pack want = before.tangent.dot(edge);
     if (kind == RetractionKind::continued) want -= (edge - before.tangent * before.length).squaredNorm() / (Pack(2.0) * before.length);
+    if (kind == RetractionKind::kept) want = before.length;
     const Pack length = sqrt(edge.squaredNorm());
     if (any_of(!(want > Pack(0.0) && length > Pack(0.0)) && firstLanes(rod.edgeEnd() - s))) return false;
     write(wanted + s, want);

@@ -117,6 +117,11 @@ rows = [
     ("mode misspelt", None, ["-mode", "dynamics"], ["-mode", "did you mean 'dynamic'"]),
     ("retraction unknown", None, ["-retraction", "none"], ["-retraction", "additive, length"]),
     ("hessian unknown", None, ["-hessian", "newton"], ["-hessian", "exact, gauss_newton"]),
+    ("integrator unknown", None, ["-integrator", "bdf3"], ["-integrator", "euler, bdf2, sdirk2, midpoint, generalized_alpha", "bdf2"]),
+    ("integrator in statics", None, ["-mode", "static", "-integrator", "bdf2"], ["-integrator", "static"]),
+    ("rho_inf too large", None, ["-integrator", "generalized_alpha", "-rho_inf", "2"], ["-rho_inf", "0 to 1"]),
+    ("rho_inf of another method", None, ["-rho_inf", "0.5"], ["-rho_inf", "generalized_alpha"]),
+    ("tolerance without adapted steps", None, ["-dt_rtol", "1e-3"], ["-dt_rtol", "-dt_adapt error"]),
     ("stray word", None, ["extra"], ["'extra' belongs to no option"]),
     ("option without its dash", None, ["dt", "1e-3"], ["'dt' belongs to no option"]),
     ("empty folder", None, ["-output_dir", ""], ["-output_dir", "needs a value"]),
@@ -288,7 +293,7 @@ failures = len(complaints)
 for complaint in complaints:
     print(complaint)
 help_text = subprocess.run([program, "-help"], capture_output=True, text=True)
-for option in "scene mode dt dt_min t_end load_steps continuation bifurcation arclength_steps gravity output_dir output_interval output_fields error_estimate accuracy accuracy_of retraction stretch rod_young rod_measure".split():
+for option in "scene mode dt dt_min integrator rho_inf dt_adapt dt_rtol dt_atol dt_max t_end load_steps continuation bifurcation arclength_steps gravity output_dir output_interval output_fields error_estimate accuracy accuracy_of retraction stretch rod_young rod_measure".split():
     if f"-{option}" not in help_text.stdout or help_text.returncode != 0:
         failures += 1
         print("-help does not list", option)

@@ -43,7 +43,7 @@ public:
   RodEnergy rodEnergy(const Configuration &configuration, int rod) const;
   double energy(const Configuration &configuration, RodSet rods) const;
   double energy(const Configuration &configuration) const { return energy(configuration, all()); }
-  /// Room for the derivatives of some rods; those of others are forgotten. Whoever asks for derivatives has to have asked for room.
+  /// Room for the derivatives of some rods; those of others are forgotten. Derivatives of other rods need room for all.
   void focus(RodSet rods);
   /// Gradient, equilibrium residual and Hessian band at the iterates of some rods, computed once per iterate.
   const Derivatives &derivatives(RodSet rods);
@@ -88,13 +88,25 @@ public:
   /// The largest of each over all rods.
   Residual residual();
 
-  /// State of some rods after the step: velocities by backward Euler, directors made orthonormal.
+  /// Displacements of the iterate since the step began, and the rates that follow from them by a rule; strains when asked for.
+  StageRates stageRates(const StageRule &rule, bool with_strains) const;
+  const Configuration &start() const { return start_; }
+  double length(int rod) const { return length_[rod]; } ///< at rest [m]
+  /// From the middle of a step to its end at `time`: positions, spins and directors move on by as much again (supports to their places), axial
+  /// forces come from the strains. False when that leads to an impossible configuration.
+  bool moveOn(double time);
+
+  /// State of some rods after the step: positions, directors made orthonormal, axial forces; and the velocities of backward Euler.
+  void commitConfiguration(State &state, RodSet rods) const;
   void commit(State &state, RodSet rods) const;
   /// Of all, with the time.
+  void commitConfiguration(State &state) const {
+    commitConfiguration(state, all());
+    commitTime(state);
+  }
   void commit(State &state) const {
     commit(state, all());
-    state.time = step_.time;
-    ++state.step;
+    commitTime(state);
   }
 
 private:
@@ -113,18 +125,24 @@ private:
   };
   std::vector<Turned> turned_; ///< supports' frames that turn in this step
   Configuration start_, iterate_;
+  Configuration reference_; ///< frames from which stages measure twist
+  const Configuration &twistReference() const { return step_.twist_reference ? *step_.twist_reference : start_; }
   Derivatives derivatives_{0};
   RodSet focus_{0, 0};
   int room_ = 0; ///< slots
   enum class Known : char { nothing, gradient, all };
   std::vector<Known> known_; ///< per rod: what derivatives_ holds of the iterate
-  std::vector<double> load_, force_scale_, length_, shortest_; ///< per rod: loads [N], or 0; the present scale of forces [N]; lengths [m]
+  std::vector<double> load_, force_scale_, length_, shortest_, longest_; ///< per rod: loads [N], or 0; the present scale of forces [N]; lengths [m]
   std::vector<double> bending_, shortest_cell_;                ///< per rod: sum of the cells' stiffnesses [N m]; [m]
   bool beyond_barrier_ = false;
 
+  void commitTime(State &state) const {
+    state.time = step_.time;
+    ++state.step;
+  }
   double reachOf(const Configuration &configuration, const RodRange &rod) const;
   double steepnessOf(const Configuration &configuration, int rod) const;
-  void turnSupports();
+  void turnSupports(const Configuration &from, double from_time);
   void followSupports(int rod);
   double forceScale(const State &start, int rod) const;
 };

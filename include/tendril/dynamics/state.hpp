@@ -8,6 +8,13 @@
 
 namespace tendril {
 
+/// Displacements, velocities or accelerations of all unknowns.
+struct Rates {
+  std::vector<Vec3> vertex; ///< (nv)
+  std::vector<double> edge; ///< (ne) of the twist
+  bool operator==(const Rates &) const = default;
+};
+
 /// All that a checkpoint needs. Copied to be restored when a step fails.
 struct State {
   double time = 0;
@@ -18,6 +25,9 @@ struct State {
   std::vector<double> twist_rate;  ///< (ne) [rad/s]
   std::vector<double> axial_force; ///< (ne) [N]
   std::vector<double> turns;       ///< (cells) 2 pi x whole turns of the twist angle, carried by continuity (`angle` measure) [rad]
+  double last_dt = 0;              ///< length of the step that led here; 0 where the integrator remembers nothing [s]
+  std::vector<Rates> memory;       ///< what the integrator remembers of steps before
+  std::vector<double> strains;     ///< before the last step, as strainsOf; where the integrator wants them
 
   bool operator==(const State &) const = default;
 };
@@ -78,6 +88,10 @@ Configuration configurationOf(const State &state, const Scene &scene, const Elem
 /// Frames of all supports, and all of one rod, into a configuration of that scene.
 void setSupports(const Scene &scene, const Elements &elements, double motion_time, Configuration &c);
 void setRod(const State &state, const Elements &elements, int rod, Configuration &c);
+
+/// Strains of a configuration: a row over slots of the edges' axial ones, and three of the cells', each with room for a pack behind.
+std::vector<double> strainsOf(const Elements &elements, const Configuration &c);
+inline std::size_t strainRow(const Elements &elements) { return std::size_t(elements.slots) + lanes; }
 
 /// Present frame of a support.
 Frame supportFrame(const Support &support, double motion_time);

@@ -3,6 +3,7 @@
 /// Steps through time (dynamics) or load (statics), rejecting what does not converge.
 
 #include "tendril/dynamics/bifurcation.hpp"
+#include "tendril/dynamics/integrator.hpp"
 #include "tendril/io/trajectory.hpp"
 #include "tendril/solver/step_solver.hpp"
 
@@ -15,8 +16,17 @@ enum class Continuation { load, arclength };
 /// What to do where a path of minima ends: nothing, locate the critical load and go on, or end the run there.
 enum class Bifurcation { off, locate, stop };
 
+/// Dynamics: steps as given, or as long as the error of a step allows.
+enum class Adaptation { none, error };
+
 struct LoopSettings {
   bool dynamic = true;
+  IntegratorSettings integrator;
+  Adaptation adapt = Adaptation::none;
+  double dt_rtol = 1e-3, dt_atol = 1e-6; ///< error of a step over rod lengths: at most atol + rtol x what it moved
+  double dt_max = 0;                     ///< of adapted steps; 0: no bound [s]
+  double output_interval = 0;            ///< adapted steps end at its multiples; 0: anywhere [s]
+  bool estimate_error = false;           ///< also of steps that are not adapted
   double dt = 1e-2, dt_min = 0, t_end = 1; ///< in statics time is the load factor and ends at 1
   Continuation continuation = Continuation::load;
   Bifurcation bifurcation = Bifurcation::locate; ///< statics, load steps
@@ -31,6 +41,8 @@ struct StepControl {
   double dt = 0;      ///< of the next step [s, or load factor]; 0: that of the settings
   int good = 0;       ///< steps since the last rejection
   bool stable = true; ///< statics: the last state was a minimum
+  double error = 0;       ///< adapted steps: of the last one, over what is allowed; 0 where unknown
+  double error_sum = 0;   ///< of all steps, over rod lengths
 };
 
 /// Takes steps and tells the observer of each one accepted.
@@ -39,7 +51,7 @@ public:
   using Observer = std::function<PetscErrorCode(const State &, const Diagnostics &)>;
   StepControl control;
   CriticalObserver on_critical; ///< told of each critical point, before the step beyond it
-  TimeLoop(StepSolver &solver, const LoopSettings &settings) : solver_(solver), settings_(settings) {}
+  TimeLoop(StepSolver &solver, const LoopSettings &settings) : solver_(solver), settings_(settings), integrator_(makeIntegrator(settings.integrator)) {}
 
   /// Advances `state` to the end. `finished` is false when dt_min was reached; `state` is then the last one accepted, bit for bit.
   PetscErrorCode run(State &state, const Observer &observe, bool *finished);
@@ -51,8 +63,20 @@ private:
   StepSolver &solver_;
   LoopSettings settings_;
   std::string failure_;
-  double located_ = -1; ///< last critical load factor
+  std::unique_ptr<Integrator> integrator_;
+  Integrator::Stages stages_; ///< of the step under way
+  double located_ = -1;       ///< last critical load factor
 
+  /// Error of the step under way, and what it moved: the largest of any rod, root mean square over its length [turns in rad].
+  struct StepError {
+    double error = 0, moved = 0;
+    bool known = false;
+  };
+  PetscErrorCode solveStages(const State &start, const Step &step, NewtonReport *report);
+  StepError stepError(const State &start, double h) const;
+  void finishStages(State &state, double h);
+  double nextStep(double time, double *landing) const;
+  bool adapt(double h, double dt_min, const StepError &error);
   PetscErrorCode locate(State &start, const Step &step, bool *stop);
 };
 

@@ -3,7 +3,7 @@
 /// A term of the incremental potential: its value and its derivatives over the slots of one rod. To add an energy, write one file with a
 /// class derived from Term and add one line to makeTerms (terms.cpp).
 
-#include "tendril/dynamics/state.hpp"
+#include "tendril/dynamics/stage.hpp"
 
 #include <memory>
 
@@ -13,13 +13,16 @@ namespace tendril {
 /// second derivatives of the strains and without compression (what other codes use: slower, never indefinite; for comparison). Or none, where only the gradient is wanted.
 enum class HessianKind { exact, uncompressed, gauss_newton, none };
 
-/// One step to be taken: from the start state to `time`.
+/// One step, or stage of one, to be taken: from the start state to `time`.
 struct Step {
-  double dt = 0;          ///< [s]; 0 in statics
+  double dt = 0;          ///< velocities are displacements over this [s]; 0 in statics
   double time = 0;        ///< at the end of the step: prescribed motions are at this time [s]
   double load_factor = 1; ///< on gravity, forces, torques and moments
   bool mixed = true;      ///< axial force as its own unknown, condensed edge by edge
   HessianKind hessian = HessianKind::exact;
+  const StageRule *rule = nullptr; ///< of the stage, with the same dt; null: backward Euler
+  const Configuration *twist_reference = nullptr; ///< frames from which twist is measured (carryFrames); null: those of the start
+  double dampingDt() const { return rule ? rule->damping_dt : dt; }
   bool isStatic() const { return dt == 0; }
 };
 
@@ -50,6 +53,12 @@ public:
   /// Adds gradient and Hessian, pulled back by the retraction at the configuration.
   virtual void addDerivatives(const Configuration &configuration, int rod, Derivatives &out, HessianKind hessian = HessianKind::exact) const = 0;
 };
+
+/// Strain around which dissipation by stiffness pulls: that at the start, with what the stage remembers.
+template <class T> T dampedRest(const Step &step, const T &start, std::size_t index) {
+  if (!step.rule || !step.rule->strains || step.rule->damping_memory == 0) return start;
+  return start + T(step.rule->damping_memory) * (start - read<T>(step.rule->strains->data() + index));
+}
 
 /// Axial force of every edge as a linear law of its strain over one step: stiffness (strain - rest), dissipation included. Over slots.
 class AxialLaw {

@@ -16,6 +16,7 @@ struct Options {
   bool help = false;
   std::optional<std::string> mode; ///< these as given; `loop` holds what is in force
   std::optional<double> dt, t_end;
+  std::string dynamic_only; ///< an option that was given and means something in dynamics only
   std::optional<int> given_load_steps, arclength_steps;
   std::optional<Continuation> continuation;
   std::optional<Bifurcation> bifurcation;

@@ -55,6 +55,7 @@ struct Motion {
 
   bool moves() const { return !table.empty() || !velocity.isZero(0) || !angular_velocity.isZero(0); }
   Vec3 displacementAt(double time) const;
+  Vec3 velocityAt(double time) const;       ///< where it jumps, that before [m/s]
   Vec3 rotationVectorAt(double time) const; ///< [rad]
   Mat3 rotationAt(double time) const;
 };

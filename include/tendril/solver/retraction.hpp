@@ -9,7 +9,8 @@ namespace tendril {
 /// `additive` adds the increments to the positions. `length` gives every edge its linearised new length t.(e + de) along its new direction,
 /// so that turning an edge does not stretch it: the stretching energy no longer limits the step (docs/theory.md, Retraction).
 /// `continued` lengthens edges as the last step did, where the increments are that step's: (l^2 - |e - de|^2)/2l, which is not t.de.
-enum class RetractionKind { additive, length, continued };
+/// `kept` turns edges without lengthening them.
+enum class RetractionKind { additive, length, continued, kept };
 
 class Retraction {
 public:

@@ -1,0 +1,52 @@
+#pragma once
+/// \file integrator.hpp
+/// Time integrators. Every stage of a step minimises one incremental potential, m/2 w |d - d_hat|^2 + U; a method only says how velocities and
+/// accelerations follow from the displacements d (StageRule), and what is left at the end of the step. docs/theory.md has the formulas.
+/// To add one, write a class in one file of dynamics/integrators/ and one line in the list of integrator.cpp.
+
+#include "tendril/dynamics/stage.hpp"
+#include "tendril/solver/step_solver.hpp"
+
+namespace tendril {
+
+class Integrator {
+public:
+  using Stages = std::vector<StageRates>; ///< those of a step that are done
+  virtual ~Integrator() = default;
+  virtual int order() const { return 2; }
+  /// Stages of the step that follows a state.
+  virtual int stages(const State & /*start*/) const { return 1; }
+  /// Stage number done.size() of a step of length h [s].
+  virtual StageRule stage(const State &start, double h, const Stages &done) const = 0;
+  /// Whether the last stage is the end of the step; else it is its middle.
+  virtual bool endsAtStage() const { return true; }
+  /// Whether State::strains is wanted, where stiffness dissipates.
+  virtual bool remembersStrains() const { return false; }
+  /// Fills the memory of a state that has none; most methods begin without.
+  virtual PetscErrorCode begin(StepSolver & /*solver*/, double /*h*/, State & /*state*/) const { return PetscErrorCode(0); }
+  /// Local error of the displacements of a step, to leading order; empty where nothing is known yet.
+  virtual Combination error(const State &start, double h, const Stages &done) const = 0;
+  /// Velocities and memory after the step; everything else of the state is still that at the start.
+  virtual void finish(State &state, double h, const Stages &done) const = 0;
+};
+
+/// Accelerations of a state from the forces on it. \param h about the length of a step [s]
+Rates startAcceleration(StepSolver &solver, double h, const State &state);
+
+struct IntegratorSettings {
+  std::string name = "euler";
+  double rho_inf = 0.8; ///< generalized_alpha: spectral radius at infinite frequency
+};
+
+/// Names of all methods, and what each is in a few words.
+std::vector<std::string> integratorNames();
+std::string integratorMeanings();
+std::unique_ptr<Integrator> makeIntegrator(const IntegratorSettings &settings);
+
+std::unique_ptr<Integrator> makeEuler(const IntegratorSettings &);
+std::unique_ptr<Integrator> makeBdf2(const IntegratorSettings &);
+std::unique_ptr<Integrator> makeSdirk2(const IntegratorSettings &);
+std::unique_ptr<Integrator> makeMidpoint(const IntegratorSettings &);
+std::unique_ptr<Integrator> makeGeneralizedAlpha(const IntegratorSettings &);
+
+} // namespace tendril

@@ -1,0 +1,92 @@
+#include "tendril/dynamics/integrator.hpp"
+
+#include "tendril/model/scene.hpp"
+
+#include <algorithm>
+
+namespace tendril {
+namespace {
+
+/// All methods. A new one needs its line here and nothing else.
+struct Entry {
+  const char *name, *meaning;
+  std::unique_ptr<Integrator> (*make)(const IntegratorSettings &);
+};
+constexpr Entry entries[] = {
+    {"euler", "backward Euler, first order, most dissipative", makeEuler},
+    {"bdf2", "second order, L-stable, keeps its order on stiff rods", makeBdf2},
+    {"sdirk2", "second order, L-stable, two solves a step, first order on stiff rods", makeSdirk2},
+    {"midpoint", "second order, keeps the energy within a band, damps nothing", makeMidpoint},
+    {"generalized_alpha", "second order, damps high frequencies by -rho_inf", makeGeneralizedAlpha},
+};
+
+} // namespace
+
+/// (F - dU/dq)/m - alpha v where nothing is held. Strains have the rates that velocities give them.
+Rates startAcceleration(StepSolver &solver, double h, const State &state) {
+  IncrementalPotential &potential = solver.potential();
+  const Elements &elements = potential.elements();
+  StageRule rest; // at the start: neither velocities nor accelerations
+  rest.dt = rest.damping_dt = h;
+  Step step;
+  step.dt = h;
+  step.time = state.time;
+  step.rule = &rest;
+  solver.begin(state, step);
+  std::vector<double> before;
+  if (std::any_of(potential.scene().rods.begin(), potential.scene().rods.end(),
+                  [](const Rod &rod) { return rod.material.stiffness_damping_coefficient != 0; })) {
+    const double moment = 1e-3 * h; // long enough for the strains to change by more than their rounding
+    Planes back = potential.dofs().makePlanes();
+    for (const RodRange &rod : elements.rods) {
+      for (int i = 0; i < rod.vertices; ++i) back.setVector(0, rod.slot(i), -moment * elements.freedom()[rod.slot(i)] * state.velocity[rod.first_vertex + i]);
+      for (int i = 0; rod.twist && i < rod.edges; ++i) back[3][rod.slot(i)] = -moment * state.twist_rate[rod.first_edge + i];
+      potential.dofs().copyBehindRing(rod, back);
+    }
+    Configuration earlier;
+    bool possible = true;
+    for (int r = 0; r < potential.all().end; ++r) possible = potential.tryMove(back, 1, r, RetractionKind::additive, earlier) && possible;
+    if (possible) {
+      before = strainsOf(elements, earlier);
+      rest.damping_dt = moment;
+      rest.damping_memory = -1;
+      rest.strains = &before;
+      solver.begin(state, step);
+    }
+  }
+  Rates a{std::vector<Vec3>(state.velocity.size(), Vec3::Zero()), std::vector<double>(state.twist_rate.size(), 0.0)};
+  for (int r = 0; r < int(elements.rods.size()); ++r) {
+    const RodRange &rod = elements.rods[r];
+    const Planes &force = potential.gradient(r).equilibrium;
+    const double damping = potential.scene().rods[r].material.mass_damping_coefficient;
+    for (int i = 0; i < rod.vertices; ++i) {
+      const int s = rod.slot(i), v = rod.first_vertex + i;
+      if (elements.freedom()[s] != 0 && elements.mass()[s] > 0) a.vertex[v] = -force.vector(0, s) / elements.mass()[s] - damping * state.velocity[v];
+    }
+    for (int i = 0; rod.twist && i < rod.edges; ++i) {
+      const int s = rod.slot(i), e = rod.first_edge + i;
+      if (elements.twistMass()[s] > 0) a.edge[e] = -force[3][s] / elements.twistMass()[s] - damping * state.twist_rate[e];
+    }
+  }
+  return a;
+}
+
+std::vector<std::string> integratorNames() {
+  std::vector<std::string> names;
+  for (const Entry &e : entries) names.emplace_back(e.name);
+  return names;
+}
+
+std::string integratorMeanings() {
+  std::string text;
+  for (const Entry &e : entries) text += std::string(text.empty() ? "" : "; ") + e.name + " (" + e.meaning + ")";
+  return text;
+}
+
+std::unique_ptr<Integrator> makeIntegrator(const IntegratorSettings &settings) {
+  for (const Entry &e : entries)
+    if (settings.name == e.name) return e.make(settings);
+  throw SceneError("there is no integrator '" + settings.name + "'; choose from " + integratorMeanings());
+}
+
+} // namespace tendril

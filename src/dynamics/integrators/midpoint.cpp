@@ -1,0 +1,51 @@
+/// Implicit midpoint: v = d/(h/2), a = (v - v_n)/(h/2) in the middle of the step; its end lies as far beyond, v_n+1 = 2 v - v_n. Keeps linear momentum and what
+/// is quadratic in the motion; the energy stays within a band. Nothing damps stiff motions.
+#include "tendril/dynamics/integrator.hpp"
+
+namespace tendril {
+namespace {
+
+class Midpoint final : public Integrator {
+public:
+  bool endsAtStage() const override { return false; }
+  bool remembersStrains() const override { return true; }
+
+  PetscErrorCode begin(StepSolver &solver, double h, State &state) const override {
+    PetscFunctionBeginUser;
+    state.memory = {startAcceleration(solver, h, state)};
+    PetscFunctionReturn(0);
+  }
+
+  StageRule stage(const State &start, double h, const Stages &) const override {
+    StageRule rule;
+    rule.fraction = 0.5;
+    rule.dt = rule.damping_dt = 0.5 * h;
+    rule.acceleration.add(-1, start);
+    rule.guess.add(0.5 * h, start);
+    rule.guess.add(0.125 * h * h, start.memory[0]);
+    if (start.strains.empty()) return rule;
+    // Along the chord from the start to the middle strains change with the square of the motion, too, of which the rate in the middle has twice as
+    // much: what is missing was, in the last step, half of the difference between the strain at its end and that as far beyond its middle.
+    rule.damping_memory = -0.5 * std::pow(h / start.last_dt, 2);
+    rule.strains = &start.strains;
+    return rule;
+  }
+
+  /// h^3/12 x''', by the accelerations in the middles of this step and the last; of the first, in its middle and at its start.
+  Combination error(const State &start, double h, const Stages &done) const override {
+    const double third = h * h * h / 12 / (0.5 * (h + start.last_dt));
+    return Combination().add(third, done[0].acceleration).add(-third, start.memory[0]);
+  }
+
+  void finish(State &state, double, const Stages &done) const override {
+    for (std::size_t v = 0; v < state.velocity.size(); ++v) state.velocity[v] = 2 * done[0].velocity.vertex[v] - state.velocity[v];
+    for (std::size_t e = 0; e < state.twist_rate.size(); ++e) state.twist_rate[e] = 2 * done[0].velocity.edge[e] - state.twist_rate[e];
+    state.memory = {done[0].acceleration};
+  }
+};
+
+} // namespace
+
+std::unique_ptr<Integrator> makeMidpoint(const IntegratorSettings &) { return std::make_unique<Midpoint>(); }
+
+} // namespace tendril
