@@ -12,7 +12,7 @@ void requireDeadLoads(const Scene &scene) {
       throw SceneError("the support of rod '" + scene.rods[support.rod].name + "' at vertex " + std::to_string(support.vertex) +
                        " moves: -continuation arclength scales dead loads only; hold the support still or use -continuation load");
   const bool weight = !scene.gravity.isZero(0) && std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &rod) { return rod.gravity; });
-  if (!weight && scene.forces.empty() && scene.moments.empty())
+  if (!weight && scene.rotation.angular_velocity.isZero(0) && scene.forces.empty() && scene.moments.empty())
     throw SceneError("-continuation arclength needs a load to follow: gravity, a force, a torque or a moment");
 }
 

@@ -16,6 +16,7 @@ std::vector<double> loads(const Scene &scene, const std::vector<double> &length)
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
     const Rod &rod = scene.rods[r];
     double s = rod.gravity ? rod.material.linear_density * length[r] * scene.gravity.norm() : 0;
+    s += rod.material.linear_density * length[r] * length[r] * scene.rotation.angular_velocity.squaredNorm();
     for (const NodalForce &f : scene.forces)
       if (f.rod == int(r)) s += f.force.norm();
     for (const EdgeMoment &c : scene.moments)

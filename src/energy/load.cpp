@@ -1,4 +1,4 @@
-/// Gravity, nodal forces, and couples on edges.
+/// Gravity, centrifugal and nodal forces, and couples on edges.
 #include "tendril/energy/term.hpp"
 
 namespace tendril {
@@ -8,7 +8,7 @@ namespace {
 /// no potential over large rotations, so it is measured from the last iterate: all that a line search compares starts there.
 class Load final : public Term {
 public:
-  Load(const Scene &scene, const Elements &elements) : elements_(elements), full_(3, elements.slots), couples_(scene.rods.size()) {
+  Load(const Scene &scene, const Elements &elements) : elements_(elements), turns_(!scene.rotation.angular_velocity.isZero(0)), centre_(scene.rotation.centre), spin_(scene.rotation.matrix()), full_(3, elements.slots), couples_(scene.rods.size()) {
     for (std::size_t r = 0; r < scene.rods.size(); ++r)
       if (scene.rods[r].gravity)
         for (int s = elements.rods[r].first_slot; s < elements.rods[r].vertexEnd(); ++s) full_.setVector(0, s, elements.mass()[s] * scene.gravity);
@@ -44,6 +44,14 @@ public:
     Pack work(0.0);
     for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) work += readVector<Pack>(force_, 0, s).dot(c.positions<Pack>(s) - start_->positions<Pack>(s));
     double sum = -reduce(work);
+    if (turns_) {
+      Pack centrifugal(0.0);
+      for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) {
+        const Vector3<Pack> x = c.positions<Pack>(s), a = accelerationAt(x);
+        centrifugal += read<Pack>(elements_.mass() + s) * ((x[0] - Pack(centre_[0])) * a[0] + (x[1] - Pack(centre_[1])) * a[1] + (x[2] - Pack(centre_[2])) * a[2]);
+      }
+      sum -= 0.5 * factor_ * reduce(centrifugal);
+    }
     for (const Couple &m : couples_[r]) {
       const Vec3 t = c.frameAt(m.slot).tangent, axis = m.tangent.cross(t);
       const double sine = axis.norm(), turning = sine > 0 ? std::atan2(sine, m.tangent.dot(t)) / sine : 1;
@@ -57,6 +65,15 @@ public:
     const RodRange &rod = elements_.rods[r];
     for (int a = 0; a < 3; ++a)
       for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) addTo<Pack>(out.equilibrium[a] + s, -read<Pack>(force_[a] + s));
+    if (turns_)
+      for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) {
+        const Pack weight = Pack(factor_) * read<Pack>(elements_.mass() + s);
+        const Vector3<Pack> a = accelerationAt(c.positions<Pack>(s));
+        for (int k = 0; k < 3; ++k) {
+          addTo<Pack>(out.equilibrium[k] + s, -weight * a[k]);
+          for (int l = k; l < 3 && hessian != HessianKind::none; ++l) addTo<Pack>(out.band.entry(rod, k, l - k) + (s - rod.first_slot), -weight * Pack(spin_(k, l)));
+        }
+      }
     for (const Couple &m : couples_[r]) {
       const Frame f = c.frameAt(m.slot);
       const Vec3 pair = factor_ * m.moment.cross(f.tangent) / f.length;
@@ -76,10 +93,20 @@ private:
     double spin;
   };
   const Elements &elements_;
+  bool turns_;
+  Vec3 centre_;
+  Mat3 spin_; ///< see Scene::Rotation::matrix
   Planes full_, force_; ///< forces on vertices [N] at load factor 1, and now
   std::vector<std::vector<Couple>> couples_;
   const Configuration *start_ = nullptr;
   double factor_ = 1;
+
+  /// Centrifugal acceleration.
+  Vector3<Pack> accelerationAt(const Vector3<Pack> &x) const {
+    Vector3<Pack> a;
+    for (int k = 0; k < 3; ++k) a[k] = Pack(spin_(k, 0)) * (x[0] - Pack(centre_[0])) + Pack(spin_(k, 1)) * (x[1] - Pack(centre_[1])) + Pack(spin_(k, 2)) * (x[2] - Pack(centre_[2]));
+    return a;
+  }
 
   /// Symmetric part of the derivative of the gradient of a couple over (e, theta): with g_e = -(M x t)/l and g_theta = -M.t,
   /// d g_e/d e = -[M]x (I - 2 t t')/l^2 ... symmetrised, d g_theta/d e = -(I - t t') M/l and d g_e/d theta = 0.

@@ -9,7 +9,7 @@ std::vector<std::unique_ptr<Term>> makeTerms(const Scene &scene, const Elements 
   const bool heavy = !scene.gravity.isZero(0) && std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &r) { return r.gravity; });
   terms.push_back(makeStretch(elements, axial));
   if (!elements.cell_slot.empty()) terms.push_back(makeBendTwist(scene, elements));
-  if (heavy || !scene.forces.empty() || !scene.moments.empty()) terms.push_back(makeLoad(scene, elements));
+  if (heavy || !scene.rotation.angular_velocity.isZero(0) || !scene.forces.empty() || !scene.moments.empty()) terms.push_back(makeLoad(scene, elements));
   if (dynamic) terms.push_back(makeInertia(scene, elements));
   return terms;
 }
@@ -27,6 +27,11 @@ std::vector<std::unique_ptr<Term>> makeTerms(const Scene &scene, const Elements 
   for (int i = 0; i < rod.edges; ++i) kinetic += elements.twistMass()[rod.slot(i)] * state.twist_rate[rod.first_edge + i] * state.twist_rate[rod.first_edge + i];
   budget.kinetic = 0.5 * kinetic;
   budget.gravity = scene.rods[r].gravity ? -load_factor * gravity : 0;
+  if (!scene.rotation.angular_velocity.isZero(0))
+    for (int i = 0; i < rod.vertices; ++i) {
+      const Vec3 away = state.position[rod.first_vertex + i] - scene.rotation.centre;
+      budget.gravity -= 0.5 * load_factor * elements.mass()[rod.slot(i)] * away.dot(scene.rotation.matrix() * away);
+    }
   Pack stretch(0.0), bend(0.0), twist(0.0);
   for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
     const Pack strain = read<Pack>(c[Configuration::strain] + s);

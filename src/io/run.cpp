@@ -124,6 +124,8 @@ PetscErrorCode setUp(Prepared &prepared, Options &o) {
   if (o.gravity) file.scene.gravity = *o.gravity;
   resolve(file.run, o);
   if (!o.loop.dynamic) requireHeld(file.scene);
+  if (o.loop.dynamic && !file.scene.rotation.angular_velocity.isZero(0))
+    throw SceneError("scene key 'rotation': is for -mode static, a scene at rest in a frame that turns; in dynamics let supports turn by their motion");
   if (o.bifurcation && o.loop.bifurcation != Bifurcation::off && !file.scene.moments.empty())
     throw SceneError("option -bifurcation: a scene with couples has no potential whose Hessian could tell stability; use off");
   if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength) requireDeadLoads(file.scene);

@@ -319,6 +319,12 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
   SceneFile out;
   YamlMap map(YamlValue(root, path, "scene"));
   out.scene.gravity = map.vector("gravity", Vec3(0, -9.81, 0));
+  if (map.has("rotation")) {
+    YamlMap rotation(map.at("rotation"));
+    out.scene.rotation.angular_velocity = rotation.at("angular_velocity").vector();
+    out.scene.rotation.centre = rotation.vector("centre", Vec3::Zero());
+    rotation.finish();
+  }
   if (map.has("simulation")) readRun(map.at("simulation"), out.run);
   for (const YamlValue &v : map.at("rods").items()) readRod(v, overrides, out.scene.rods, out.drawings);
   if (out.scene.rods.empty()) map.at("rods").fail("a scene needs at least one rod");

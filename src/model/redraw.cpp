@@ -131,6 +131,7 @@ int edgeMultiple(const Scene &scene, const Drawing &drawing, int r) {
 Scene redraw(const Scene &written, const std::vector<Drawing> &drawings, const std::vector<int> &edges) {
   Scene scene;
   scene.gravity = written.gravity;
+  scene.rotation = written.rotation;
   for (std::size_t r = 0; r < written.rods.size(); ++r)
     scene.rods.push_back(edges[r] == written.rods[r].edges() ? written.rods[r] : redrawn(written.rods[r], drawings[r], edges[r]));
   for (const Support &support : written.supports) {

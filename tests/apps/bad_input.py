@@ -109,6 +109,8 @@ rows = [
     ("step in statics", None, ["-mode", "static", "-dt", "0.1"], ["-dt", "no meaning"]),
     ("unknown field", None, ["-output_fields", "colour"], ["-output_fields", "colour", "all,position,director", "curvature,twist,strain_energy_density,force,moment"]),
     ("field misspelt in a list", None, ["-output_fields", "all,momnet"], ["-output_fields", "'momnet'", "moment"]),
+    ("rotation in dynamics", ("gravity:", "rotation: {angular_velocity: [0, 0, 1]}\ngravity:"), [], ["'rotation'", "-mode static"]),
+    ("rotation without speed", ("gravity:", "rotation: {centre: [0, 0, 1]}\ngravity:"), ["-mode", "static"], ["scene.yaml:1", "angular_velocity"]),
     ("gravity of two", None, ["-gravity", "0,1"], ["-gravity", "three numbers"]),
     ("gravity of four", None, ["-gravity", "0,1,2,3"], ["-gravity", "three numbers"]),
     ("step without a value", None, ["-dt", "-t_end", "1"], ["-dt", "needs a value"]),

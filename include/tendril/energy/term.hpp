@@ -89,7 +89,7 @@ template <class T> std::array<T, 3> presentStrain(const Elements &elements, cons
   return elements.measure[rod] == Measure::tan ? cellStrain<Measure::tan>(f0, f1, constants) : cellStrain<Measure::angle>(f0, f1, constants);
 }
 
-/// Stored and kinetic energies of a state [J].
+/// Stored and kinetic energies of a state [J]; centrifugal potential counts as gravity.
 struct EnergyBudget {
   double kinetic = 0, stretch = 0, bend = 0, twist = 0, gravity = 0;
   double total() const { return kinetic + stretch + bend + twist + gravity; }

@@ -90,6 +90,13 @@ struct Scene {
   std::vector<NodalForce> forces;
   std::vector<EdgeMoment> moments;
   Vec3 gravity{0, -9.81, 0}; ///< [m/s^2]
+  /// Statics in a frame that turns about an axis through `centre`: the scene is at rest there, under centrifugal forces.
+  struct Rotation {
+    Vec3 angular_velocity = Vec3::Zero(); ///< [rad/s]
+    Vec3 centre = Vec3::Zero();           ///< [m]
+    /// Acceleration at a place: matrix() (x - centre).
+    Mat3 matrix() const { return angular_velocity.squaredNorm() * Mat3::Identity() - angular_velocity * angular_velocity.transpose(); }
+  } rotation;
 };
 
 /// Fills the directors of a rod with discrete Bishop frames: `start` (or some normal of the first edge when zero) transported along the
