@@ -536,8 +536,14 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
     if (k == 0) report_.first_negative_pivots = negative;
     if (seek == Seek::equilibrium && negative >= 0) break;
     if (negative == 0 || (negative > 0 && !potential_->scene().moments.empty())) break; // couples: no minimum to speak of
-    bool left = false;
-    if (negative > 0 && k < 10) PetscCall(escapeSaddle(&left));
+    bool left = false, neutral = false;
+    if (negative > 0 && k < 10) PetscCall(escapeSaddle(&left, &neutral));
+    if (neutral && !left) {
+      report_.neutral_pivots += negative;
+      report_.negative_pivots = 0;
+      if (k == 0) report_.first_negative_pivots = 0;
+      break;
+    }
     if (!left) {
       failure = negative < 0 ? "the Hessian cannot be factored" : "the equilibrium is unstable (negative pivots) and no way down from it was found";
       break;

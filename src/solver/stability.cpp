@@ -73,8 +73,10 @@ PetscErrorCode NewtonSolver::shiftUntilPositive(bool regular) {
 
 /// A direction of negative curvature at an unstable equilibrium, in work_->increment. With the Hessian K = E - G split into the part E without
 /// compression and the effect G of compression, iterating v <- E^-1 G v gives the first buckling mode, the smoothest way out. Where compression
-/// is not the cause, inverse iteration with the shifted Hessian finds the lowest mode.
-PetscErrorCode NewtonSolver::findBucklingMode(bool *found) {
+/// is not the cause, inverse iteration with the shifted Hessian finds the lowest mode. `neutral`: the mode costs no energy, to rounding, and
+/// nothing goes down: a turn of the whole rod about an axis, say.
+PetscErrorCode NewtonSolver::findBucklingMode(bool *found, bool *neutral) {
+  constexpr double rounding = 1e-7; // of the energies that balance: stiff edges leave that much of them
   PetscFunctionBeginUser;
   const DofMap &dofs = potential_->dofs();
   const Elements &e = potential_->elements();
@@ -130,7 +132,9 @@ PetscErrorCode NewtonSolver::findBucklingMode(bool *found) {
   Planes right = soften();
   for (int k = 0; k < 100 && !*found; ++k) {
     PetscCall(solveLinear(right, work_->increment));
-    *found = k >= 5 && dot(work_->increment, right) < dot(work_->increment, soften());
+    const double stiff = dot(work_->increment, right), soft = dot(work_->increment, soften());
+    *neutral = std::abs(soft - stiff) < rounding * std::abs(stiff);
+    *found = k >= 5 && stiff < soft && !*neutral;
     normalise();
     right = soften();
   }
@@ -140,11 +144,11 @@ PetscErrorCode NewtonSolver::findBucklingMode(bool *found) {
 
 /// Leaves a saddle along a direction of negative curvature; its side and length come from trials of growing size, with both retractions:
 /// edges that are just right must keep their lengths, edges that an unstable state holds compressed must be free to grow.
-PetscErrorCode NewtonSolver::escapeSaddle(bool *left) {
+PetscErrorCode NewtonSolver::escapeSaddle(bool *left, bool *neutral) {
   PetscFunctionBeginUser;
   *left = false;
   bool found;
-  PetscCall(findBucklingMode(&found));
+  PetscCall(findBucklingMode(&found, neutral));
   if (!found) PetscFunctionReturn(0);
   // One unit: the edge that turns most turns by one radian.
   double turning = 0;

@@ -102,8 +102,8 @@ private:
   double firstShift(int rod) const;
   PetscErrorCode includeMotion(Vec y);
   bool searchRod(int rod, double *lambda);
-  PetscErrorCode findBucklingMode(bool *found);
-  PetscErrorCode escapeSaddle(bool *left);
+  PetscErrorCode findBucklingMode(bool *found, bool *neutral);
+  PetscErrorCode escapeSaddle(bool *left, bool *neutral);
   void predict(const State &start);
   const IncrementalPotential::RodEnergy &energyAtIterate(int rod);
   void forgetEnergies() { fill(work_->energy_known, false); }
