@@ -341,7 +341,7 @@ IncrementalPotential::Residual IncrementalPotential::residual(int r, const RodEn
   const RodRange &rod = elements_.rods[r];
   const Material &m = scene_.rods[r].material;
   const Planes &out_of_balance = gradient(r).equilibrium;
-  Pack forces(0.0), moments(0.0), tension(0.0), shortest(shortest_[r]), error(0.0);
+  Pack forces(0.0), moments(0.0), tension(0.0), error(0.0);
   for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) {
     forces += read<Pack>(elements_.freedom() + s) * readVector<Pack>(out_of_balance, 0, s).squaredNorm();
     const Pack g = read<Pack>(out_of_balance[3] + s);

@@ -1,6 +1,7 @@
 #include "tendril/dynamics/stage.hpp"
 
 #include "tendril/energy/edge.hpp"
+#include "tendril/energy/term.hpp"
 
 namespace tendril {
 
@@ -138,10 +139,7 @@ std::vector<double> strainsOf(const Elements &elements, const Configuration &c) 
   for (const int s : elements.edge_slot) strains[s] = c[Configuration::strain][s];
   for (int r = 0; r < int(elements.rods.size()); ++r)
     forCells(elements, r, [&]<class T>(const LooseCell &cell, int count) {
-      const auto [f0, f1] = cellFrames<T>(c, cell, count);
-      const CellOf<T> constants = cellOf<T>(elements.cells(), c, cell.slot);
-      const std::array<T, 3> s =
-          elements.measure[r] == Measure::tan ? cellStrain<Measure::tan>(f0, f1, constants) : cellStrain<Measure::angle>(f0, f1, constants);
+      const std::array<T, 3> s = presentStrain<T>(elements, c, r, cell, count);
       for (int k = 0; k < 3; ++k) write(strains.data() + (k + 1) * row + cell.slot, s[k]);
     });
   return strains;

@@ -41,8 +41,7 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
 /// First shift to try [1/s^2]: the slowest bending wave of the rod where it is fastest, EI/(rho L^4), or the edge's own axial one for a cable.
 double NewtonSolver::firstShift(int r) const {
   const Rod &rod = potential_->scene().rods[r];
-  double length = 0;
-  for (int i = 0; i < rod.edges(); ++i) length += rod.edge(i).norm();
+  const double length = potential_->length(r);
   const Material &m = rod.material;
   const auto [k1, k2] = m.flexural_stiffness;
   const double softest = k1 > 0 && k2 > 0 ? std::min(k1, k2) : std::max(k1, k2);

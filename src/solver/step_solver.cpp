@@ -26,19 +26,32 @@ PetscErrorCode StepSolver::setUp(IncrementalPotential &potential, Coupling coupl
   PetscFunctionBeginUser;
   potential_ = &potential;
   const Elements &e = potential.elements();
-  const RodSet all = potential.all();
-  work_.emplace(potential, e.slots);
-  blocks_.clear();
-  PetscCall(blocks_.emplace_back().setUp(potential, *work_, all));
-  const std::vector<RodSet> blocks = blocksOf(e.rods);
-  // Loose cells are not beside their rod.
+  // Loose cells are not beside their rod, where the work arrays of a block end.
   const bool loose = std::any_of(e.loose.begin(), e.loose.end(), [](const auto &cells) { return !cells.empty(); });
-  if (coupling == Coupling::load || !front().isBanded() || loose || blocks.size() == 1) PetscFunctionReturn(0);
-  int slots = 0;
-  for (const RodSet &block : blocks) slots = std::max(slots, potential.dofs().slots(block));
+  std::vector<RodSet> blocks;
+  if (coupling == Coupling::none && !loose) blocks = blocksOf(e.rods);
+  if (blocks.size() > 1) {
+    PetscCall(setUpBlocks(blocks));
+    if (front().isBanded()) PetscFunctionReturn(0);
+  }
+  PetscCall(setUpBlocks({potential.all()}));
+  PetscFunctionReturn(0);
+}
+
+/// Stops after the first when it shows that another solver than `banded` was chosen, which needs the scene as one.
+PetscErrorCode StepSolver::setUpBlocks(const std::vector<RodSet> &blocks) {
+  PetscFunctionBeginUser;
+  int slots = potential_->elements().slots;
+  if (blocks.size() > 1) {
+    slots = 0;
+    for (const RodSet &block : blocks) slots = std::max(slots, potential_->dofs().slots(block));
+  }
   blocks_.clear();
-  work_.emplace(potential, slots);
-  for (const RodSet &block : blocks) PetscCall(blocks_.emplace_back().setUp(potential, *work_, block));
+  work_.emplace(*potential_, slots);
+  for (const RodSet &block : blocks) {
+    PetscCall(blocks_.emplace_back().setUp(*potential_, *work_, block));
+    if (!front().isBanded()) break;
+  }
   PetscFunctionReturn(0);
 }
 

@@ -39,6 +39,8 @@ private:
   IncrementalPotential *potential_ = nullptr;
   std::optional<NewtonWork> work_;
   std::deque<NewtonSolver> blocks_;
+
+  PetscErrorCode setUpBlocks(const std::vector<RodSet> &blocks);
 };
 
 } // namespace tendril
