@@ -139,6 +139,8 @@ PetscErrorCode DofMap::createMatrix(Mat *matrix) {
   PetscFunctionBeginUser;
   std::vector<PetscInt> row, column;
   source_.clear();
+  Band band; // its window is that of all rods, which begins with the first
+  band.setOrigin(rods_.front().first_slot);
   for (const RodRange &rod : rods_)
     for (int i = 0; i < rod.vertices; ++i)
       for (int a = 0; a < slot_size; ++a)
@@ -149,7 +151,7 @@ PetscErrorCode DofMap::createMatrix(Mat *matrix) {
           if (u < 0 || v < 0) continue;
           row.push_back(u);
           column.push_back(v);
-          source_.push_back(Band().offset(rod, a, k) + i);
+          source_.push_back(band.offset(rod, a, k) + i);
         }
   const std::size_t upper = source_.size();
   for (std::size_t n = 0; n < upper; ++n)

@@ -45,7 +45,8 @@ Planes shiftMetric(const Elements &e, const DofMap &dofs) {
   for (const RodRange &rod : e.rods) {
     for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) metric.setVector(0, s, Vec3::Constant(mass[s]));
     if (rod.twist)
-      for (int i = 0; i < rod.edges; ++i) metric[3][rod.slot(i)] = 0.5 * (mass[rod.slot(i)] + mass[rod.slot((i + 1) % rod.vertices)]) * std::pow(length[rod.slot(i)], 2);
+      for (int i = 0; i < rod.edges; ++i)
+        metric[3][rod.slot(i)] = 0.5 * (mass[rod.slot(i)] + mass[rod.slot((i + 1) % rod.vertices)]) * std::pow(length[rod.slot(i)], 2);
   }
   return metric;
 }
@@ -61,9 +62,9 @@ double dot(const RodRange &rod, const Planes &a, const Planes &b) {
 } // namespace
 
 NewtonWork::NewtonWork(const IncrementalPotential &potential, int slots)
-    : wanted(potential.all().end, true), shift(wanted.size(), 0), last_shift(shift), negative(wanted.size(), 0), energy(wanted.size()), energy_known(wanted.size(), false),
-      residual(wanted.size()), moving(wanted.size(), false), increment(slot_size, slots), coordinates(increment), trial(slots), motion(potential.dofs().makePlanes()),
-      metric(shiftMetric(potential.elements(), potential.dofs())) {}
+    : wanted(potential.all().end, true), shift(wanted.size(), 0), last_shift(shift), negative(wanted.size(), 0), energy(wanted.size()),
+      energy_known(wanted.size(), false), residual(wanted.size()), moving(wanted.size(), false), increment(slot_size, slots), coordinates(increment),
+      trial(slots), motion(potential.dofs().makePlanes()), metric(shiftMetric(potential.elements(), potential.dofs())) {}
 
 void NewtonWork::setOrigin(int first_slot) {
   increment.setOrigin(first_slot);
@@ -92,6 +93,7 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
   rods_ = set;
   DofMap &dofs = potential.dofs();
   work_ = &work;
+  if (circulatory_.emplace(potential, set); circulatory_->isNone()) circulatory_.reset();
   system_ = {&dofs, set, &potential.band(), &work.metric, &work.wanted, &work.shift, &work.room};
   const bool whole = set.begin == 0 && set.end == dofs.all().end;
   if (whole)
@@ -315,6 +317,14 @@ PetscErrorCode NewtonSolver::includeMotion(Vec y) {
   PetscFunctionReturn(0);
 }
 
+/// Newton direction of the whole derivative, couples included, from that of its symmetric part, in work_->increment.
+PetscErrorCode NewtonSolver::includeCirculation(bool *regular) {
+  PetscFunctionBeginUser;
+  PetscCall(circulatory_->update([this](const Planes &right, Planes &solution) { return solveLinear(right, solution); }));
+  *regular = circulatory_->correct(work_->increment);
+  PetscFunctionReturn(0);
+}
+
 const IncrementalPotential::RodEnergy &NewtonSolver::energyAtIterate(int r) {
   if (!work_->energy_known[r]) work_->energy[r] = potential_->rodEnergy(potential_->iterate(), r);
   work_->energy_known[r] = true;
@@ -345,12 +355,14 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
     (void)PetscLogEventEnd(events().energy, 0, 0, 0, 0);
     return energy;
   };
+  // Where the symmetric part is indefinite, couples have nothing that an equilibrium would minimise.
+  const bool free = seek_ == Seek::equilibrium || (potential_->step().isStatic() && circulatory_ && circulatory_->acts(r) && work_->negative[r] > 0);
   *lambda = 1;
   bool accepted = false;
   for (int trial = 0; trial < most_trials && !accepted; ++trial) {
     after = attempt(*lambda);
     // Supports that move do work: the energy may rise with them, and only has to be finite.
-    accepted = std::isfinite(after.value) && (work_->moving[r] || seek_ == Seek::equilibrium || after.value <= before.value + sufficient * *lambda * slope + before.noise);
+    accepted = std::isfinite(after.value) && (work_->moving[r] || free || after.value <= before.value + sufficient * *lambda * slope + before.noise);
     if (accepted) break;
     // Minimum of the parabola through both energies and the slope, kept within a fifth and a half.
     const double curvature = after.value - before.value - *lambda * slope;
@@ -360,7 +372,7 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
   if (!accepted) return false;
   // A full step that gained clearly more than a quadratic would: the minimum lies beyond, as on the way down from a barrier.
   const double gain = (after.value - before.value) / slope;
-  if (*lambda == 1 && gain > 0.6 && gain < 1 && -slope > 1e3 * before.noise) {
+  if (!free && *lambda == 1 && gain > 0.6 && gain < 1 && -slope > 1e3 * before.noise) {
     const double longer = std::min(2.0, 0.5 / (1 - gain));
     const IncrementalPotential::RodEnergy beyond = attempt(longer);
     if (beyond.value < after.value) {
@@ -386,6 +398,7 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   if (seek_ == Seek::minimum && (report_.negative_pivots > 0 || !regular)) PetscCall(makeDescent(f, y, regular));
   if (std::any_of(work_->moving.begin() + rods_.begin, work_->moving.begin() + rods_.end, [](char m) { return m; })) PetscCall(includeMotion(y));
   PetscCall(potential_->dofs().scatter(y, rods_, work_->increment));
+  if (circulatory_) PetscCall(includeCirculation(&regular));
 
   PetscCall(PetscLogEventBegin(events().line_search, 0, 0, 0, 0));
   double shortest = 1;
@@ -475,8 +488,10 @@ std::string NewtonSolver::nearBarrier() const {
   constexpr double near = 150, degrees = 180 / pi;
   std::string hint;
   if (twist * degrees > near)
-    hint += "; neighbouring edges are twisted by " + std::to_string(int(twist * degrees)) + " degrees, and measure tan has a barrier at 180: use more edges, or measure: angle";
-  if (turning * degrees > near) hint += "; neighbouring edges are folded by " + std::to_string(int(turning * degrees)) + " degrees of at most 180: use more edges";
+    hint += "; neighbouring edges are twisted by " + std::to_string(int(twist * degrees)) +
+            " degrees, and measure tan has a barrier at 180: use more edges, or measure: angle";
+  if (turning * degrees > near)
+    hint += "; neighbouring edges are folded by " + std::to_string(int(turning * degrees)) + " degrees of at most 180: use more edges";
   return hint;
 }
 

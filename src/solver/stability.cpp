@@ -8,16 +8,12 @@ namespace tendril {
 
 /// Direction for an indefinite Hessian. A few negative pivots mean a state near a branching: a shifted diagonal keeps most of Newton's speed there.
 /// Many mean compressed edges: then their compression is left out of the Hessian, and the diagonal shifted only if that is not enough.
-/// Couples have no potential and no definite Hessian: for them Newton's own direction stands as long as it goes downhill.
+/// In statics an equilibrium of couples need not be a minimum of anything: there Newton's own direction stands.
 PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
   constexpr int few = 4; // the two planes of the first two buckling modes
   KSP ksp;
   PetscFunctionBeginUser;
-  if (regular && !potential_->scene().moments.empty()) {
-    PetscScalar slope;
-    PetscCall(VecDot(f, y, &slope));
-    if (slope > 0) PetscFunctionReturn(0);
-  }
+  if (regular && circulatory_ && potential_->step().isStatic()) PetscFunctionReturn(0);
   const int unshifted = report_.negative_pivots;
   const HessianKind kind = potential_->step().hessian == HessianKind::exact ? HessianKind::uncompressed : potential_->step().hessian;
   bool compressed = false;

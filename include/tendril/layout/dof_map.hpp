@@ -86,7 +86,7 @@ public:
   DM dm() const { return dm_; }
   /// Matrix of PETSc's own type over the unknowns, preallocated for the band of every rod.
   PetscErrorCode createMatrix(Mat *matrix);
-  /// Puts the band into the matrix, both triangles.
+  /// Puts the band of all rods into the matrix, both triangles.
   PetscErrorCode fillMatrix(const Band &band, Mat matrix);
 
   /// Copies of the first vertices and edge of a closed rod behind its last.

@@ -4,7 +4,9 @@
 
 #include "tendril/dynamics/incremental_potential.hpp"
 #include "tendril/solver/banded.hpp"
+#include "tendril/solver/circulatory.hpp"
 
+#include <optional>
 #include <string>
 
 namespace tendril {
@@ -84,6 +86,7 @@ private:
   OwnedMat jacobian_;
   bool banded_ = true;
   OwnedVec x_, f_, right_, solution_;
+  std::optional<Circulatory> circulatory_; ///< where couples act
   Vec iterate_vec_ = nullptr; ///< vector that holds the coordinates of the potential's iterate, ...
   PetscObjectState iterate_state_ = 0; ///< ... and its state when they were written
   NewtonReport report_;
@@ -101,6 +104,7 @@ private:
   PetscErrorCode shiftUntilPositive(bool regular);
   double firstShift(int rod) const;
   PetscErrorCode includeMotion(Vec y);
+  PetscErrorCode includeCirculation(bool *regular);
   bool searchRod(int rod, double *lambda);
   PetscErrorCode findBucklingMode(bool *found, bool *neutral);
   PetscErrorCode escapeSaddle(bool *left, bool *neutral);

@@ -1,0 +1,87 @@
+#include "tendril/solver/circulatory.hpp"
+
+#include <algorithm>
+
+namespace tendril {
+
+Circulatory::Circulatory(const IncrementalPotential &potential, RodSet rods) : potential_(potential), rods_(rods), counts_(rods.end - rods.begin) {
+  for (int r = rods.begin; r < rods.end; ++r)
+    for (const EdgeMoment &m : potential.scene().moments) {
+      if (m.rod != r) continue;
+      couples_.push_back(m);
+      ++counts_[r - rods.begin];
+    }
+  const int most = *std::max_element(counts_.begin(), counts_.end());
+  solved_.assign(2 * most, potential.dofs().makePlanes());
+}
+
+double Circulatory::Column::dot(const Planes &x) const { return edge.dot(x.vector(0, slot + 1) - x.vector(0, slot)) + twist * x[3][slot]; }
+
+void Circulatory::Column::addTo(Planes &x) const {
+  x.setVector(0, slot, x.vector(0, slot) - edge);
+  x.setVector(0, slot + 1, x.vector(0, slot + 1) + edge);
+  x[3][slot] += twist;
+}
+
+PetscErrorCode Circulatory::update(const Solve &solve) {
+  PetscFunctionBeginUser;
+  columns_.clear();
+  strength_.clear();
+  for (const EdgeMoment &couple : couples_) {
+    const int slot = potential_.elements().rods[couple.rod].slot(couple.edge);
+    const Frame f = potential_.iterate().frameAt(slot);
+    const Vec3 moment = potential_.step().load_factor * (couple.moment - couple.torque * f.tangent);
+    const double size = moment.norm();
+    // Two directions across the moment; their spins are what it turns into each other.
+    const Vec3 along = size > 0 ? Vec3(moment / size) : f.tangent, across = along.unitOrthogonal();
+    for (const Vec3 &d : {across, Vec3(along.cross(across))}) columns_.push_back({couple.rod, slot, d.cross(f.tangent) / f.length, d.dot(f.tangent)});
+    strength_.push_back(0.5 * size);
+  }
+  Planes right = potential_.dofs().makePlanes();
+  for (std::size_t k = 0; k < solved_.size(); ++k) {
+    right.clear();
+    std::size_t first = 0;
+    for (int r = rods_.begin; r < rods_.end; first += 2 * counts_[r++ - rods_.begin]) {
+      if (k >= std::size_t(2 * counts_[r - rods_.begin])) continue;
+      columns_[first + k].addTo(right);
+      potential_.dofs().fold(potential_.dofs().rods()[r], right);
+    }
+    PetscCall(solve(right, solved_[k]));
+  }
+  PetscFunctionReturn(0);
+}
+
+bool Circulatory::correct(Planes &x) const {
+  std::size_t first = 0;
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    const int n = 2 * counts_[r - rods_.begin];
+    if (n == 0) continue;
+    const Column *column = columns_.data() + first;
+    Eigen::VectorXd right(n);
+    Eigen::MatrixXd between(n, n); // columns' rows times the solved columns
+    for (int i = 0; i < n; ++i) {
+      right[i] = column[i].dot(x);
+      for (int k = 0; k < n; ++k) between(i, k) = column[i].dot(solved_[k]);
+    }
+    // (1 + A G) c = A u'x with A = strength (a b' - b a') couple by couple
+    Eigen::MatrixXd system = Eigen::MatrixXd::Identity(n, n);
+    Eigen::VectorXd turned(n);
+    for (int j = 0; j < n; j += 2) {
+      const double strength = strength_[(first + j) / 2];
+      system.row(j) += strength * between.row(j + 1);
+      system.row(j + 1) -= strength * between.row(j);
+      turned[j] = strength * right[j + 1];
+      turned[j + 1] = -strength * right[j];
+    }
+    const Eigen::VectorXd c = system.partialPivLu().solve(turned);
+    if (!c.allFinite()) return false;
+    const RodRange &rod = potential_.dofs().rods()[r];
+    for (int k = 0; k < n; ++k)
+      for (int a = 0; a < slot_size; ++a)
+        for (int s = rod.first_slot; s < rod.vertexEnd() + (rod.closed ? 2 : 0); ++s) x[a][s] -= c[k] * solved_[k][a][s];
+    first += n;
+  }
+  return true;
+}
+
+} // namespace tendril
