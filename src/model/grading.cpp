@@ -7,7 +7,7 @@ namespace {
 
 constexpr double corner = 30 * pi / 180; ///< turning of a corner [rad]; where a smooth rod turns so much, its strains are 10 % off
 constexpr double power = 1.0 / 3;        ///< of the squared curvature
-constexpr double least_curvature = 10;   ///< over the length; with less, rods whose straight part bends under its load lose
+constexpr double least_curvature = 12;   ///< over the length; with less, rods whose straight part bends under its load lose
 constexpr double most_growth = 1.2;      ///< of edges from one to the next
 constexpr int least_samples = 2048;      ///< along a rod
 constexpr int first_edges = 8;           ///< of a rod, or as many as turn by `corner` a vertex: those at which the growth is bounded

@@ -1,5 +1,7 @@
 #include "tendril/model/redraw.hpp"
 
+#include "tendril/geometry/spline.hpp"
+
 #include <algorithm>
 #include <cstdint>
 #include <numeric>
@@ -40,7 +42,7 @@ bool isRedrawn(const Rod &written, const Drawing &drawing, int edges) { return d
 Rod redrawn(const Rod &written, const Drawing &drawing, int edges) {
   Rod rod = written;
   const Grading *grading = drawing.grading.get();
-  const Curve curve = drawing.curve ? drawing.curve : curveThrough(written);
+  const Curve curve = drawing.curve ? drawing.curve : grading ? splineThrough(written) : curveThrough(written);
   rod.position.clear();
   for (int i = 0; i < edges + (rod.closed ? 0 : 1); ++i) rod.position.push_back(curve(grading ? grading->parameterAt(double(i) / edges) : double(i) / edges));
   checkRod(rod);
@@ -153,6 +155,37 @@ Curve curveThrough(const Rod &rod) {
     Vec3 x = Vec3::Zero();
     for (int v = low; v <= high; ++v) x += weights[v - low] * rod.position[at(v)];
     return x;
+  };
+}
+
+Curve splineThrough(const Rod &rod) {
+  constexpr int overlap = 40; // where nothing ends a spline: an end is felt by a quarter less at each point
+  const int n = rod.edges();
+  std::vector<int> ends;
+  for (int v = 0; v < rod.vertices(); ++v)
+    if (rod.edgeBefore(v) < 0 || rod.edgeAfter(v) < 0 || isCorner(rod, v)) ends.push_back(v);
+  auto at = [&](int v) { return rod.closed ? wrapped(v, n) : v; };
+  struct Piece {
+    Vec3 x0, x1, m0, m1;
+    double length;
+  };
+  std::vector<Piece> pieces(n);
+  auto add = [&](int begin, int end, int margin) { // edges begin to end, from a spline that goes on by `margin` points
+    std::vector<Vec3> points;
+    for (int v = begin - margin; v <= end + margin; ++v) points.push_back(rod.position[at(v)]);
+    const std::vector<Vec3> slopes = splineSlopes(points);
+    for (int v = begin; v < end; ++v) {
+      const int k = v - begin + margin;
+      pieces[wrapped(v, n)] = {points[k], points[k + 1], slopes[k], slopes[k + 1], (points[k + 1] - points[k]).norm()};
+    }
+  };
+  for (std::size_t k = 0; k + 1 < ends.size(); ++k) add(ends[k], ends[k + 1], 0);
+  if (rod.closed) ends.empty() ? add(0, n, overlap) : add(ends.back(), ends.front() + n, 0);
+  return [pieces, n](double s) {
+    const double place = s * n;
+    const int edge = std::clamp(int(std::floor(place)), 0, n - 1);
+    const Piece &p = pieces[edge];
+    return hermite(p.x0, p.x1, p.m0, p.m1, p.length, place - edge);
   };
 }
 

@@ -11,7 +11,7 @@ namespace tendril {
 ///
 /// Source of the density: an edge of length h is off its arc by h^3 x'''/24, and |x'''| is kappa^2 on an arc. The sum of h^2 kappa^2 over the length is
 /// least, for a given number of edges, where their density goes with kappa^(2/3) (Euler-Lagrange; equidistribution after de Boor 1973). What a load bends
-/// the drawing does not tell: (kappa^2 + (10/L)^2)^(1/3), so that a straight part has edges too. Edge lengths then grow by at most 1.2 from one to the
+/// the drawing does not tell: (kappa^2 + (12/L)^2)^(1/3), so that a straight part has edges too. Edge lengths then grow by at most 1.2 from one to the
 /// next at the first number of edges (Borouchaki, Hecht, Frey 1998), or more where places that stay leave no other choice.
 struct Grading {
   std::vector<double> place;              ///< rising from 0 to 1; linear between

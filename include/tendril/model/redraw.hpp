@@ -22,6 +22,10 @@ struct Drawing {
 /// them, and an edge between two is straight.
 Curve curveThrough(const Rod &rod);
 
+/// A curve through the vertices of a rod that has a curvature everywhere but at corners: the cubic spline between corners (splineSlopes). On curves by
+/// curveThrough the tangent jumps at a point by the third power of the distance of points; vertices that no longer stand on the points would see it.
+Curve splineThrough(const Rod &rod);
+
 /// Grades the rods by the curvature of their drawing (gradingByCurvature), named vertices and corners staying vertices. What is straight or bends the same
 /// everywhere along its parameter stays uniform, unless named vertices ask there for multiples of more than 8 edges.
 void grade(const Scene &scene, std::vector<Drawing> &drawings);
