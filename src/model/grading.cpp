@@ -7,8 +7,9 @@ namespace {
 
 constexpr double corner = 30 * pi / 180; ///< turning of a corner [rad]; where a smooth rod turns so much, its strains are 10 % off
 constexpr double power = 1.0 / 3;        ///< of the squared curvature
-constexpr double least_curvature = 12;   ///< over the length; with less, rods whose straight part bends under its load lose
-constexpr double most_growth = 1.2;      ///< of edges from one to the next
+constexpr double least_curvature = 10;   ///< over the length; with less, hooks whose straight part bends under its load need more edges than uniform ones
+constexpr double most_growth = 1.5;      ///< of edges from one to the next; with 1.2, hooks need up to 9 % more edges
+constexpr double most_step = 1.2;        ///< of edges across a place that stays
 constexpr int least_samples = 2048;      ///< along a rod
 constexpr int first_edges = 8;           ///< of a rod, or as many as turn by `corner` a vertex: those at which the growth is bounded
 
@@ -126,7 +127,7 @@ std::vector<int> wholeEdges(const std::vector<double> &ends, int multiple, bool 
 /// The fewest edges that put the ends of segments on vertices without large steps of the edge length. Where those take more than `cheap`, larger steps
 /// do; beyond `most`, the smallest there are.
 std::vector<int> fewestEdges(const std::vector<double> &ends, int cheap, int most, bool closed) {
-  constexpr double most_step = 2;
+  constexpr double large_step = 2;
   constexpr int most_tries = 500;
   const int segments = int(ends.size()) - 1;
   std::vector<int> best, good;
@@ -134,8 +135,8 @@ std::vector<int> fewestEdges(const std::vector<double> &ends, int cheap, int mos
   for (int m = segments; m <= std::max(most, segments); m += 1 + std::max(most - segments, 0) / most_tries) {
     double worst;
     const std::vector<int> counts = wholeEdges(ends, m, closed, worst);
-    if (worst <= most_growth && m <= cheap) return counts;
-    if (worst <= most_step && good.empty()) good = counts;
+    if (worst <= most_step && m <= cheap) return counts;
+    if (worst <= large_step && good.empty()) good = counts;
     if (best.empty() || worst < least) {
       best = counts;
       least = worst;

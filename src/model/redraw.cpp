@@ -105,19 +105,31 @@ void addCouple(const Scene &written, const Drawing &drawing, const EdgeMoment &c
     if (weights[k] != 0) add(wrapped(first + k, edges), weights[k]);
 }
 
+/// Vertices that supports and loads name, without the ends of a rod and the first of a closed one: those are vertices of any number of edges.
 std::vector<int> namedVertices(const Scene &scene, int r) {
   std::vector<int> named;
-  for (const Support &s : scene.supports)
-    if (s.rod == r) named.push_back(s.vertex);
-  for (const NodalForce &f : scene.forces)
-    if (f.rod == r) named.push_back(f.vertex);
+  auto add = [&](int rod, int vertex) {
+    if (rod == r && vertex > 0 && vertex < scene.rods[r].edges()) named.push_back(vertex);
+  };
+  for (const Support &s : scene.supports) add(s.rod, s.vertex);
+  for (const NodalForce &f : scene.forces) add(f.rod, f.vertex);
   return named;
+}
+
+/// Twist of the directors from end to end [rad].
+double twistOf(const Rod &rod) {
+  double sum = 0;
+  for (int v = 0; v < rod.vertices(); ++v)
+    if (const int a = rod.edgeBefore(v), b = rod.edgeAfter(v); a >= 0 && b >= 0)
+      sum += std::abs(halfAngleBetween(referenceFrame(rod, a), referenceFrame(rod, b)).angle());
+  return sum;
 }
 
 /// The drawings of two rods differ by a translation, as copies do.
 bool areAlike(const Scene &scene, const std::vector<Drawing> &drawings, int a, int b) {
   const Rod &one = scene.rods[a], &two = scene.rods[b];
   if (one.closed != two.closed || one.vertices() != two.vertices() || bool(drawings[a].curve) != bool(drawings[b].curve)) return false;
+  if (drawings[a].directors_given != drawings[b].directors_given || (drawings[a].directors_given && one.director != two.director)) return false;
   const Vec3 shift = two.position[0] - one.position[0];
   const double rounding = 1e-12 * ((one.position.back() - one.position[0]).norm() + shift.norm());
   auto near = [&](const Vec3 &x, const Vec3 &y) { return (x + shift - y).norm() <= rounding; };
@@ -197,8 +209,9 @@ void grade(const Scene &scene, std::vector<Drawing> &drawings) {
       continue;
     }
     drawings[r].grading = nullptr;
-    const Grading grading = gradingByCurvature(scene.rods[r], drawings[r].curve, namedVertices(scene, r));
+    Grading grading = gradingByCurvature(scene.rods[r], drawings[r].curve, namedVertices(scene, r));
     if (drawings[r].curve && grading.uniform && edgeMultiple(scene, drawings[r], r) <= dear) continue;
+    if (drawings[r].directors_given) grading.turning = std::max(grading.turning, twistOf(scene.rods[r]));
     drawings[r].grading = std::make_shared<Grading>(grading);
   }
 }
