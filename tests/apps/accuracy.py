@@ -43,7 +43,7 @@ error = np.linalg.norm(x[-1] - exact)
 assert 0.5e-3 < error < 1e-3 and abs(estimate["error"][-1] / error - 1) < 0.02, (error, estimate["error"][-1])
 print("elastica to 1e-3:", edges, "edges, error", error)
 
-text, _, x, estimate, _ = run("deep_arch", "-mode", "static", "-accuracy", "1e-3")  # a force at the middle of a polyline
+text, _, x, estimate, _ = run("deep_arch", "-mode", "static", "-accuracy", "1e-2")  # points need not stay, but for the one in the middle that a force names
 assert (len(x) - 1) % 2 == 0 and len(x) - 1 < 64 and estimate is None, len(x)
 
 text, _, x, estimate, _ = run("verify/hook", "-accuracy", "1e-3", "-error_estimate")  # graded edges, cut in two where their map says
