@@ -10,7 +10,7 @@ constexpr double power = 1.0 / 3;        ///< of the squared curvature
 constexpr double least_curvature = 10;   ///< over the length; with less, hooks whose straight part bends under its load need more edges than uniform ones
 constexpr double most_growth = 1.5;      ///< of edges from one to the next; with 1.2, hooks need up to 9 % more edges
 constexpr double most_step = 1.2;        ///< of edges across a place that stays
-constexpr int least_samples = 2048;      ///< along a rod
+constexpr int least_samples = 1024;      ///< along a rod
 constexpr int first_edges = 8;           ///< of a rod, or as many as turn by `corner` a vertex: those at which the growth is bounded
 
 double interpolate(const std::vector<double> &x, const std::vector<double> &y, double at) {
@@ -134,6 +134,7 @@ std::vector<int> fewestEdges(const std::vector<double> &ends, int cheap, int mos
   double least = 0;
   for (int m = segments; m <= std::max(most, segments); m += 1 + std::max(most - segments, 0) / most_tries) {
     double worst;
+    if (m > cheap && !good.empty()) break;
     const std::vector<int> counts = wholeEdges(ends, m, closed, worst);
     if (worst <= most_step && m <= cheap) return counts;
     if (worst <= large_step && good.empty()) good = counts;

@@ -35,8 +35,8 @@ void grade(const Scene &scene, std::vector<Drawing> &drawings);
 int edgeMultiple(const Scene &scene, const Drawing &drawing, int rod);
 
 /// The scene with rods of other numbers of edges.
-/// - Vertex i of n moves to i m/n of m, or where the grading has it, with its supports and forces; frames of supports that the scene did not give are those of
-/// the new rod.
+/// - Vertex i of n moves to i m/n of m, or where the grading has it, with its supports and forces; frames of supports that the scene did not give are
+///   those of the new rod.
 /// - Bishop frames begin with the director of the scene's first edge, carried to the new one; given directors turn evenly between edges.
 /// - A couple on the end edge of an end that is free to turn is an end couple and stays on the end edge. Others act at the middle of their edge: four
 ///   edges share them by cubic weights. Fewer edges, or positive weights, would spread them, which shifts a rod by the square of the edge length anew.
