@@ -77,12 +77,18 @@ State prolonged(const State &state, const Scene &scene, const Elements &elements
     std::copy_n(state.position.begin() + range.first_vertex, range.vertices, present.position.begin());
     const Curve curve = curveThrough(present);
     present.position.clear();
-    for (int i = 0; i < fine.rods[r].vertices(); ++i) present.position.push_back(curve(0.5 * i / range.edges));
+    // Edges are cut where they are at rest, graded ones off their middle.
+    const Rod &halves = fine.rods[r];
+    auto firstPart = [&](int i) {
+      const double a = halves.edge(2 * i).norm(), b = halves.edge(2 * i + 1).norm();
+      return a / (a + b);
+    };
+    for (int i = 0; i < halves.vertices(); ++i) present.position.push_back(curve((i / 2 + (i % 2 == 0 ? 0 : firstPart(i / 2))) / range.edges));
     out.position.insert(out.position.end(), present.position.begin(), present.position.end());
     for (int i = 0; i < range.edges; ++i) {
       const Frame f = c.frameAt(range.slot(i));
-      const double quarter = 0.25 * elements.restLength()[range.slot(i)];
-      for (const auto &[child, turn] : {std::pair(2 * i, -quarter * rates[r].before[i]), std::pair(2 * i + 1, quarter * rates[r].after[i])}) {
+      const double half = 0.5 * elements.restLength()[range.slot(i)], first = firstPart(i); // middles move by half the other part
+      for (const auto &[child, turn] : {std::pair(2 * i, (first - 1) * half * rates[r].before[i]), std::pair(2 * i + 1, first * half * rates[r].after[i])}) {
         const Vec3 t = present.edge(child).normalized();
         out.director.push_back(orthonormalised(rotateAbout<double>(transport<double>(f.director, f.tangent, t), t, turn), t));
         out.axial_force.push_back(state.axial_force[range.first_edge + i]);

@@ -28,7 +28,9 @@ int firstEdges(const Rod &rod, const Drawing &drawing, int multiple) {
   for (int i = 0; i < rod.edges(); ++i) length += rod.edge(i).norm();
   double turning = rod.natural == Rod::Natural::given ? rod.natural_strain.head<2>().norm() * length : 0;
   turning = std::max(turning, 2 * pi * std::abs(rod.initial_turns));
-  if (drawing.curve) {
+  if (drawing.grading)
+    turning = std::max(turning, drawing.grading->turning);
+  else if (drawing.curve) {
     const int samples = std::max(1000, 4 * rod.edges());
     double along = 0;
     Vec3 before = drawing.curve(1.0 / samples) - drawing.curve(0);

@@ -135,6 +135,7 @@ PetscErrorCode setUp(Prepared &prepared, Options &o) {
   if (o.accuracy || (o.error_estimate && !o.loop.dynamic)) {
     prepared.written = file.scene;
     prepared.drawings = std::move(file.drawings);
+    if (o.accuracy) grade(prepared.written, prepared.drawings);
   }
   PetscCall(makeReady(std::move(file.scene), o, prepared.run));
   PetscCall(PetscLogStagePop());

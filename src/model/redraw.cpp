@@ -1,12 +1,13 @@
 #include "tendril/model/redraw.hpp"
 
+#include "tendril/geometry/spline.hpp"
+
 #include <algorithm>
+#include <cstdint>
 #include <numeric>
 
 namespace tendril {
 namespace {
-
-constexpr double corner = 30 * pi / 180; ///< turning of a corner [rad]; where a smooth rod turns so much, its strains are 10 % off
 
 /// Weights by which values at `nodes` give the value at `x` of the polynomial through them.
 std::vector<double> lagrangeWeights(const std::vector<double> &nodes, double x) {
@@ -18,13 +19,6 @@ std::vector<double> lagrangeWeights(const std::vector<double> &nodes, double x) 
 }
 
 int wrapped(int i, int n) { return ((i % n) + n) % n; }
-
-double turningAt(const Rod &rod, int vertex) {
-  const int a = rod.edgeBefore(vertex), b = rod.edgeAfter(vertex);
-  if (a < 0 || b < 0) return 0;
-  const Vec3 e0 = rod.edge(a), e1 = rod.edge(b);
-  return std::atan2(e0.cross(e1).norm(), e0.dot(e1));
-}
 
 /// A director of the scene, or between two of them, on an edge of the redrawn rod. `place` counts the scene's edges from the middle of the first.
 Vec3 directorBetween(const Rod &written, double place, const Vec3 &tangent) {
@@ -42,27 +36,49 @@ Vec3 directorBetween(const Rod &written, double place, const Vec3 &tangent) {
   return rotateAbout<double>(a, tangent, (place - k) * angle);
 }
 
+/// Vertices stay as they are written where nothing asks for others.
+bool isRedrawn(const Rod &written, const Drawing &drawing, int edges) { return drawing.grading || edges != written.edges(); }
+
 Rod redrawn(const Rod &written, const Drawing &drawing, int edges) {
   Rod rod = written;
-  const Curve curve = drawing.curve ? drawing.curve : curveThrough(written);
+  const Grading *grading = drawing.grading.get();
+  const Curve curve = drawing.curve ? drawing.curve : grading ? splineThrough(written) : curveThrough(written);
   rod.position.clear();
-  for (int i = 0; i < edges + (rod.closed ? 0 : 1); ++i) rod.position.push_back(curve(double(i) / edges));
+  for (int i = 0; i < edges + (rod.closed ? 0 : 1); ++i) rod.position.push_back(curve(grading ? grading->parameterAt(double(i) / edges) : double(i) / edges));
   checkRod(rod);
-  const double ratio = double(written.edges()) / edges;
   if (drawing.directors_given) {
+    auto middle = [&](int i) { return grading ? grading->parameterOf(grading->middle(i, edges)) * written.edges() : (i + 0.5) * written.edges() / edges; };
     rod.director.resize(edges);
-    for (int i = 0; i < edges; ++i) rod.director[i] = directorBetween(written, (i + 0.5) * ratio - 0.5, rod.edge(i).normalized());
+    for (int i = 0; i < edges; ++i) rod.director[i] = directorBetween(written, middle(i) - 0.5, rod.edge(i).normalized());
   } else
     setBishopDirectors(rod, transport<double>(written.director[0], written.edge(0).normalized(), rod.edge(0).normalized()));
   return rod;
 }
 
-int movedVertex(const Rod &written, int vertex, int edges) {
-  const std::int64_t place = std::int64_t(vertex) * edges;
-  if (place % written.edges() != 0)
+int movedVertex(const Rod &written, const Drawing &drawing, int vertex, int edges) {
+  std::int64_t place = vertex, whole = written.edges(); // the place is their quotient
+  if (drawing.grading) {
+    const auto &stays = drawing.grading->stays;
+    const auto found = std::lower_bound(stays.begin(), stays.end(), std::pair(vertex, 0));
+    if (found == stays.end() || found->first != vertex)
+      throw SceneError("rod '" + written.name + "': its vertex " + std::to_string(vertex) + " is not among those that its grading keeps");
+    place = found->second;
+    whole = drawing.grading->multiple;
+  }
+  if (place * edges % whole != 0)
     throw SceneError("rod '" + written.name + "': its vertex " + std::to_string(vertex) + " of " + std::to_string(written.edges()) + " edges is no vertex of " +
                      std::to_string(edges));
-  return int(place / written.edges());
+  return int(place * edges / whole);
+}
+
+/// frameAtVertex of second order where the edges on either side differ: the tangent is theirs, each by the length of the other.
+Frame frameBetween(const Rod &rod, int vertex) {
+  const int a = rod.edgeBefore(vertex), b = rod.edgeAfter(vertex);
+  if (a < 0 || b < 0) return frameAtVertex(rod, vertex);
+  const Frame f0 = referenceFrame(rod, a), f1 = referenceFrame(rod, b);
+  const Vec3 t = (f1.length * f0.tangent + f0.length * f1.tangent).normalized();
+  const Vec3 d = f1.length * transport<double>(f0.director, f0.tangent, t) + f0.length * transport<double>(f1.director, f1.tangent, t);
+  return {t, orthonormalised(d, t), 1};
 }
 
 /// Whether the end of an open rod at a vertex is free to turn, tangent and director.
@@ -70,21 +86,58 @@ bool isFreeEnd(const Scene &scene, int rod, int vertex) {
   return std::none_of(scene.supports.begin(), scene.supports.end(), [&](const Support &s) { return s.rod == rod && s.vertex == vertex && s.holdsTwist(); });
 }
 
-void addCouple(const Scene &written, const EdgeMoment &couple, int edges, std::vector<EdgeMoment> &out) {
+void addCouple(const Scene &written, const Drawing &drawing, const EdgeMoment &couple, int edges, std::vector<EdgeMoment> &out) {
   const Rod &rod = written.rods[couple.rod];
+  const Grading *grading = drawing.grading.get();
   const int last = rod.edges() - 1;
   auto add = [&](int edge, double weight) { out.push_back({couple.rod, edge, weight * couple.torque, weight * couple.moment}); };
   if (!rod.closed && couple.edge == last && isFreeEnd(written, couple.rod, rod.vertices() - 1)) return add(edges - 1, 1);
   if (!rod.closed && couple.edge == 0 && isFreeEnd(written, couple.rod, 0)) return add(0, 1);
-  const double place = (couple.edge + 0.5) * edges / rod.edges() - 0.5;
+  const double parameter = (couple.edge + 0.5) / rod.edges();
+  const double place = (grading ? grading->placeOf(parameter) * edges : (couple.edge + 0.5) * edges / rod.edges()) - 0.5;
   const int count = std::min(4, edges);
   int first = int(std::floor(place)) - 1;
   if (!rod.closed) first = std::clamp(first, 0, edges - count);
-  std::vector<double> nodes(count);
-  std::iota(nodes.begin(), nodes.end(), double(first));
-  const std::vector<double> weights = lagrangeWeights(nodes, place);
+  std::vector<double> nodes;
+  for (int e = first; e < first + count; ++e) nodes.push_back(grading ? grading->middle(e, edges) : e);
+  const std::vector<double> weights = lagrangeWeights(nodes, grading ? grading->lengthOf(parameter) : place);
   for (int k = 0; k < count; ++k)
     if (weights[k] != 0) add(wrapped(first + k, edges), weights[k]);
+}
+
+/// Vertices that supports and loads name, without the ends of a rod and the first of a closed one: those are vertices of any number of edges.
+std::vector<int> namedVertices(const Scene &scene, int r) {
+  std::vector<int> named;
+  auto add = [&](int rod, int vertex) {
+    if (rod == r && vertex > 0 && vertex < scene.rods[r].edges()) named.push_back(vertex);
+  };
+  for (const Support &s : scene.supports) add(s.rod, s.vertex);
+  for (const NodalForce &f : scene.forces) add(f.rod, f.vertex);
+  return named;
+}
+
+/// Twist of the directors from end to end [rad].
+double twistOf(const Rod &rod) {
+  double sum = 0;
+  for (int v = 0; v < rod.vertices(); ++v)
+    if (const int a = rod.edgeBefore(v), b = rod.edgeAfter(v); a >= 0 && b >= 0)
+      sum += std::abs(halfAngleBetween(referenceFrame(rod, a), referenceFrame(rod, b)).angle());
+  return sum;
+}
+
+/// The drawings of two rods differ by a translation, as copies do.
+bool areAlike(const Scene &scene, const std::vector<Drawing> &drawings, int a, int b) {
+  const Rod &one = scene.rods[a], &two = scene.rods[b];
+  if (one.closed != two.closed || one.vertices() != two.vertices() || bool(drawings[a].curve) != bool(drawings[b].curve)) return false;
+  if (drawings[a].directors_given != drawings[b].directors_given || (drawings[a].directors_given && one.director != two.director)) return false;
+  const Vec3 shift = two.position[0] - one.position[0];
+  const double rounding = 1e-12 * ((one.position.back() - one.position[0]).norm() + shift.norm());
+  auto near = [&](const Vec3 &x, const Vec3 &y) { return (x + shift - y).norm() <= rounding; };
+  for (int v = 0; v < one.vertices(); ++v)
+    if (!near(one.position[v], two.position[v])) return false;
+  for (const double s : {0.123, 0.456, 0.789})
+    if (drawings[a].curve && !near(drawings[a].curve(s), drawings[b].curve(s))) return false;
+  return namedVertices(scene, a) == namedVertices(scene, b);
 }
 
 } // namespace
@@ -92,7 +145,7 @@ void addCouple(const Scene &written, const EdgeMoment &couple, int edges, std::v
 Curve curveThrough(const Rod &rod) {
   const int n = rod.edges();
   std::vector<bool> ends_cubics(rod.vertices());
-  for (int v = 0; v < rod.vertices(); ++v) ends_cubics[v] = rod.edgeBefore(v) < 0 || rod.edgeAfter(v) < 0 || turningAt(rod, v) > corner;
+  for (int v = 0; v < rod.vertices(); ++v) ends_cubics[v] = rod.edgeBefore(v) < 0 || rod.edgeAfter(v) < 0 || isCorner(rod, v);
   return [rod, n, ends_cubics](double s) {
     const double place = s * n;
     const int edge = std::clamp(int(std::floor(place)), 0, n - 1);
@@ -117,14 +170,58 @@ Curve curveThrough(const Rod &rod) {
   };
 }
 
+Curve splineThrough(const Rod &rod) {
+  constexpr int overlap = 40; // where nothing ends a spline: an end is felt by a quarter less at each point
+  const int n = rod.edges();
+  std::vector<int> ends;
+  for (int v = 0; v < rod.vertices(); ++v)
+    if (rod.edgeBefore(v) < 0 || rod.edgeAfter(v) < 0 || isCorner(rod, v)) ends.push_back(v);
+  auto at = [&](int v) { return rod.closed ? wrapped(v, n) : v; };
+  struct Piece {
+    Vec3 x0, x1, m0, m1;
+    double length;
+  };
+  std::vector<Piece> pieces(n);
+  auto add = [&](int begin, int end, int margin) { // edges begin to end, from a spline that goes on by `margin` points
+    std::vector<Vec3> points;
+    for (int v = begin - margin; v <= end + margin; ++v) points.push_back(rod.position[at(v)]);
+    const std::vector<Vec3> slopes = splineSlopes(points);
+    for (int v = begin; v < end; ++v) {
+      const int k = v - begin + margin;
+      pieces[wrapped(v, n)] = {points[k], points[k + 1], slopes[k], slopes[k + 1], (points[k + 1] - points[k]).norm()};
+    }
+  };
+  for (std::size_t k = 0; k + 1 < ends.size(); ++k) add(ends[k], ends[k + 1], 0);
+  if (rod.closed) ends.empty() ? add(0, n, overlap) : add(ends.back(), ends.front() + n, 0);
+  return [pieces, n](double s) {
+    const double place = s * n;
+    const int edge = std::clamp(int(std::floor(place)), 0, n - 1);
+    const Piece &p = pieces[edge];
+    return hermite(p.x0, p.x1, p.m0, p.m1, p.length, place - edge);
+  };
+}
+
+void grade(const Scene &scene, std::vector<Drawing> &drawings) {
+  constexpr int dear = 8; // multiples above this are worth edges that are not quite uniform
+  for (int r = 0; r < int(drawings.size()); ++r) {
+    if (r > 0 && areAlike(scene, drawings, r - 1, r)) {
+      drawings[r].grading = drawings[r - 1].grading;
+      continue;
+    }
+    drawings[r].grading = nullptr;
+    Grading grading = gradingByCurvature(scene.rods[r], drawings[r].curve, namedVertices(scene, r));
+    if (drawings[r].curve && grading.uniform && edgeMultiple(scene, drawings[r], r) <= dear) continue;
+    if (drawings[r].directors_given) grading.turning = std::max(grading.turning, twistOf(scene.rods[r]));
+    drawings[r].grading = std::make_shared<Grading>(grading);
+  }
+}
+
 int edgeMultiple(const Scene &scene, const Drawing &drawing, int r) {
+  if (drawing.grading) return drawing.grading->multiple;
   const int n = scene.rods[r].edges();
   if (!drawing.curve) return n;
   int common = n;
-  for (const Support &s : scene.supports)
-    if (s.rod == r) common = std::gcd(common, s.vertex);
-  for (const NodalForce &f : scene.forces)
-    if (f.rod == r) common = std::gcd(common, f.vertex);
+  for (const int v : namedVertices(scene, r)) common = std::gcd(common, v);
   return n / common;
 }
 
@@ -133,18 +230,21 @@ Scene redraw(const Scene &written, const std::vector<Drawing> &drawings, const s
   scene.gravity = written.gravity;
   scene.rotation = written.rotation;
   for (std::size_t r = 0; r < written.rods.size(); ++r)
-    scene.rods.push_back(edges[r] == written.rods[r].edges() ? written.rods[r] : redrawn(written.rods[r], drawings[r], edges[r]));
+    scene.rods.push_back(isRedrawn(written.rods[r], drawings[r], edges[r]) ? redrawn(written.rods[r], drawings[r], edges[r]) : written.rods[r]);
   for (const Support &support : written.supports) {
     Support &s = scene.supports.emplace_back(support);
-    if (edges[s.rod] == written.rods[s.rod].edges()) continue;
-    s.vertex = movedVertex(written.rods[s.rod], support.vertex, edges[s.rod]);
-    const Frame f = frameAtVertex(scene.rods[s.rod], s.vertex);
+    const Rod &rod = scene.rods[s.rod];
+    const Drawing &drawing = drawings[s.rod];
+    if (!isRedrawn(written.rods[s.rod], drawing, edges[s.rod])) continue;
+    s.vertex = movedVertex(written.rods[s.rod], drawing, support.vertex, edges[s.rod]);
+    const Frame f = drawing.grading ? frameBetween(rod, s.vertex) : frameAtVertex(rod, s.vertex);
     if (!s.tangent_given) s.frame.tangent = f.tangent;
     if (!s.director_given) s.frame.director = f.director;
     s.frame.director = orthonormalised(s.frame.director, s.frame.tangent);
   }
-  for (const NodalForce &f : written.forces) scene.forces.push_back({f.rod, movedVertex(written.rods[f.rod], f.vertex, edges[f.rod]), f.force});
-  for (const EdgeMoment &m : written.moments) addCouple(written, m, edges[m.rod], scene.moments);
+  for (const NodalForce &f : written.forces)
+    scene.forces.push_back({f.rod, movedVertex(written.rods[f.rod], drawings[f.rod], f.vertex, edges[f.rod]), f.force});
+  for (const EdgeMoment &m : written.moments) addCouple(written, drawings[m.rod], m, edges[m.rod], scene.moments);
   return scene;
 }
 

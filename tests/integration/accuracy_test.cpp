@@ -136,6 +136,89 @@ TEST(Accuracy, IsMetOnASpring) {
   }
 }
 
+/// How many edges of which kind an accuracy takes, and what error they have.
+struct Price {
+  int edges;
+  double estimated, error; ///< over the length
+};
+
+Price priceOf(const SceneFile &file, const LoopSettings &settings, double tolerance) {
+  Choice choice;
+  EXPECT_EQ(chooseEdges(file.scene, file.drawings, settings, {tolerance}, &choice), PetscErrorCode(0));
+  const int n = choice.edges[0];
+  std::vector<std::vector<Vec3>> x;
+  double length = 0;
+  for (const int m : {n, 2 * n, 4 * n}) {
+    Simulation run;
+    runTo(run, redraw(file.scene, file.drawings, {m}), settings);
+    x.push_back(run.state.position);
+    length = 0;
+    for (int i = 0; i < m; ++i) length += run.scene.rods[0].edge(i).norm();
+  }
+  Price price{n, choice.error[0], 0};
+  for (std::size_t v = 0; v < x[0].size(); ++v) // the last two extrapolated are good to h^4
+    price.error = std::max(price.error, (x[0][v] - x[2][4 * v] - (x[2][4 * v] - x[1][2 * v]) / 3).norm() / length);
+  return price;
+}
+
+/// Edges of equal length: a grading without a weight.
+void setEqualEdges(SceneFile &file) {
+  Grading equal = gradingByCurvature(file.scene.rods[0], file.drawings[0].curve, {});
+  for (std::size_t j = 0; j < equal.place.size(); ++j) equal.place[j] = equal.length[j] / equal.length.back();
+  file.drawings[0].grading = std::make_shared<Grading>(equal);
+}
+
+TEST(Accuracy, GradedEdgesAreFewer) { // prints the table of docs/theory.md
+  struct Row {
+    const char *name;
+    SceneFile file;
+    int load_steps;
+    std::vector<double> tolerances;
+  };
+  std::vector<Row> rows{{"hook", verifyScene("hook"), 4, {1e-2, 1e-3, 1e-4}},
+                        {"helix", readScene(std::string(TENDRIL_SOURCE_DIR) + "/data/scenes/helix.yaml"), 10, {1e-2, 1e-3, 1e-4}}};
+  rows[1].file.scene.supports[0].kind = Support::Kind::clamp; // by its pin alone it could turn for nothing
+  std::printf("%-6s %9s %8s %8s %8s %10s %10s\n", "scene", "tolerance", "as drawn", "equal", "graded", "estimated", "true");
+  for (Row &row : rows)
+    for (const double tolerance : row.tolerances) {
+      const LoopSettings settings = statics(row.load_steps);
+      SceneFile equal = row.file, graded = row.file;
+      setEqualEdges(equal);
+      grade(graded.scene, graded.drawings);
+      const Price a = priceOf(row.file, settings, tolerance), b = priceOf(equal, settings, tolerance), c = priceOf(graded, settings, tolerance);
+      std::printf("%-6s %9.0e %8d %8d %8d %10.2e %10.2e\n", row.name, tolerance, a.edges, b.edges, c.edges, c.estimated, c.error);
+      EXPECT_LT(c.error, tolerance) << row.name;
+      EXPECT_NEAR(c.estimated, c.error, (tolerance > 5e-3 ? 0.05 : 0.03) * c.error) << row.name; // the first number of edges turns by 30 degrees a vertex
+      EXPECT_LE(c.edges, std::min(a.edges, b.edges)) << row.name;
+      if (tolerance < 5e-3 && &row == &rows[0]) EXPECT_LT(c.edges, 0.75 * std::min(a.edges, b.edges));
+    }
+}
+
+TEST(ErrorEstimate, OfGradedEdgesIsThatOfACleanSeries) {
+  SceneFile file = verifyScene("hook");
+  grade(file.scene, file.drawings);
+  const int n = 37; // no vertex but the ends is one of the points
+  std::vector<std::vector<Vec3>> x;
+  for (int factor = 1; factor <= 8; factor *= 2) {
+    Simulation run;
+    runTo(run, redraw(file.scene, file.drawings, {factor * n}), statics(4));
+    x.push_back(run.state.position);
+  }
+  double error[3] = {0, 0, 0};
+  for (int v = 0; v <= n; ++v)
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 limit = x[3][8 * v] + (x[3][8 * v] - x[2][4 * v]) / 3;
+      error[k] = std::max(error[k], (x[k][v << k] - limit).norm());
+    }
+  EXPECT_NEAR(order(error[0], error[1]), 2, 0.05);
+  EXPECT_NEAR(order(error[1], error[2]), 2, 0.05);
+  Simulation run;
+  Estimate e;
+  estimateOf(file, {n}, statics(4), run, e);
+  ASSERT_EQ(e.none, "");
+  EXPECT_NEAR(e.rods[0].error, error[0], 0.01 * error[0]); // the next term of the series
+}
+
 TEST(Accuracy, IsChosenRodByRod) {
   SceneFile file = verifyScene("tip_load");
   file.scene.rods.push_back(file.scene.rods[0]);

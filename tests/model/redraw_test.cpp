@@ -110,6 +110,56 @@ TEST(Redraw, CouplesGiveACleanSeries) {
     }
 }
 
+/// Tip of a parabola under a couple on one of its 12 edges as written, graded, with `edges`; clamped where it is straightest, for a clamp on a curved rod
+/// that is twisted has a cubic term.
+Vec3 tipOfParabola(int edge, const Vec3 &couple, double torque, int edges) {
+  const Curve curve = [](double s) { return Vec3(1 - s, 2 * (1 - s) * (1 - s), 0); };
+  std::vector<Vec3> points;
+  for (int i = 0; i <= 12; ++i) points.push_back(curve(i / 12.0));
+  Scene scene = clampedScene(inextensibleRod(points, Measure::angle));
+  scene.supports[0].tangent_given = true;
+  scene.supports[0].frame.tangent = Vec3(-1, -4, 0).normalized();
+  scene.rods[0].material.flexural_stiffness = {1, 1.5};
+  scene.moments = {{0, edge, torque, couple}};
+  scene.forces = {{0, 12, Vec3(0, 0.1, 0.05)}};
+  std::vector<Drawing> drawings{{curve, false}};
+  grade(scene, drawings);
+  Simulation sim;
+  runTo(sim, redraw(scene, drawings, {edges}), statics());
+  return sim.state.position.back();
+}
+
+TEST(Redraw, CouplesOnGradedEdgesGiveACleanSeries) {
+  for (const int edge : {1, 5, 8}) // a place of its own among the graded edges
+    for (const double torque : {0.0, 0.2}) {
+      const Vec3 couple = torque == 0 ? Vec3(0.05, 0.1, 0.2) : Vec3::Zero();
+      const Vec3 x1 = tipOfParabola(edge, couple, torque, 34), x2 = tipOfParabola(edge, couple, torque, 68), x4 = tipOfParabola(edge, couple, torque, 136);
+      const Vec3 limit = x4 + (x4 - x2) / 3;
+      EXPECT_NEAR(order((x1 - x2).norm(), (x2 - x4).norm()), 2, 0.1) << edge << " " << torque;
+      EXPECT_LT((x2 + (x2 - x1) / 3 - limit).norm(), 0.05 * (x2 - limit).norm()) << edge << " " << torque;
+    }
+}
+
+/// Largest distance of vertices prolonged at rest from those of the graded rod with twice the edges.
+double prolongedError(int edges) {
+  const Curve curve = [](double s) { return Vec3(s, 2 * s * s, 0); };
+  std::vector<Vec3> points;
+  for (int i = 0; i <= 12; ++i) points.push_back(curve(i / 12.0));
+  const Scene scene = clampedScene(inextensibleRod(points));
+  std::vector<Drawing> drawings{{curve, false}};
+  grade(scene, drawings);
+  Simulation a, b;
+  EXPECT_EQ(a.setUp(redraw(scene, drawings, {edges}), statics()), PetscErrorCode(0));
+  EXPECT_EQ(b.setUp(redraw(scene, drawings, {2 * edges}), statics()), PetscErrorCode(0));
+  const State state = prolonged(a.state, a.scene, *a.elements, b.scene, *b.elements);
+  double worst = 0;
+  for (std::size_t v = 0; v < state.position.size(); ++v) worst = std::max(worst, (state.position[v] - b.state.position[v]).norm());
+  for (std::size_t e = 0; e < state.director.size(); ++e) EXPECT_LT((state.director[e] - b.state.director[e]).norm(), 1e-3);
+  return worst;
+}
+
+TEST(Prolonged, GradedEdgesAreCutWhereTheyAreAtRest) { EXPECT_NEAR(order(prolongedError(32), prolongedError(64)), 4, 0.5); } // in their middles, 2
+
 TEST(Prolonged, TwistKeepsItsWholeTurns) {
   for (const Support::Kind kind : {Support::Kind::clamp, Support::Kind::fix_twist}) {
     Rod rod = straightRod(8, Measure::angle);
