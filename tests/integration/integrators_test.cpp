@@ -1,6 +1,8 @@
 /// Time integrators: their orders, what they keep, exact solutions, adapted steps.
 #include "support/rods.hpp"
 
+#include "tendril/io/scene_reader.hpp"
+
 namespace tendril::test {
 namespace {
 
@@ -304,6 +306,29 @@ TEST(Adaptation, LandsOnTheTimesOfFrames) {
   }
   for (const double t : {0.1, 0.2, 0.3, 0.35})
     EXPECT_TRUE(std::any_of(run.times.begin(), run.times.end(), [&](double a) { return std::abs(a - t) < 1e-15; })) << t;
+}
+
+/// Inertia turns what positions round into forces, in steps of microseconds more than -snes_rtol allows: Newton must not look for less than that. No load acts
+/// on the ring, and adapted steps begin where it starts from rest, short.
+TEST(Adaptation, TakesShortSteps) {
+  const Scene ring = readScene(std::string(TENDRIL_SOURCE_DIR) + "/data/scenes/twisted_ring.yaml").scene;
+  for (const std::string &name : integratorNames()) {
+    auto outcome = [&](const LoopSettings &settings) {
+      Simulation sim;
+      EXPECT_EQ(sim.setUp(ring, settings), PetscErrorCode(0));
+      return runOn(sim, settings);
+    };
+    LoopSettings begin = adapted(name, 5e-3, 1e-4, 1e-3);
+    begin.dt_atol = 1e-6;
+    EXPECT_LE(outcome(begin).rejected, 10) << name; // by the error, down from 5 ms, by at most ten times each
+    for (const double dt : {5e-6, 1e-8}) {
+      LoopSettings fixed = with(name, dt, 5 * dt);
+      fixed.dt_min = dt / 2;
+      const Outcome run = outcome(fixed);
+      EXPECT_EQ(run.rejected, 0) << name << " " << dt;
+      EXPECT_LE(run.iterations, 4 * run.steps) << name << " " << dt; // two stages
+    }
+  }
 }
 
 /// On a stiff rod Newton takes about as many iterations as on a soft one; midpoint, whose axial forces swing from step to step, more than twice as many.
