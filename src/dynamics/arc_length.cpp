@@ -249,7 +249,7 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
   const double first = settings_.dt / direction.factor; // as long as a load step of dt
   const double shortest = first * (settings_.dt_min > 0 ? settings_.dt_min / settings_.dt : 1.0 / 1024);
   double length = first;
-  int rejected = 0;
+  int rejected = 0, in_vain = 0; // steps since the last one accepted, and their iterations
   EnergyBudget before = energyBudget(potential.scene(), potential.elements(), state, state.time);
   for (int taken = 0; taken < settings_.arclength_steps && state.time < settings_.t_end;) {
     const State start = state;
@@ -278,6 +278,7 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     if (!converged) { // the state was not touched
       last_ = before_step;
       ++rejected;
+      in_vain += iterations_;
       length *= 0.5;
       if (length >= shortest) continue;
       std::ostringstream message;
@@ -299,6 +300,7 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     row.newton_iterations = iterations_;
     row.negative_pivots = negative_;
     row.rejected_steps = std::exchange(rejected, 0);
+    row.rejected_iterations = std::exchange(in_vain, 0);
     PetscCall(PetscTime(&now));
     row.wall_seconds = now - begin;
     PetscCall(observe(state, row));

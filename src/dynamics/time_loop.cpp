@@ -145,7 +145,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
   int &good = control.good;
   bool &stable = control.stable;
   if (settings_.dynamic && state.memory.empty()) PetscCall(integrator_->begin(solver_, dt, state));
-  int rejected = 0;
+  int rejected = 0, in_vain = 0; // steps since the last one accepted, and their iterations
   PetscLogDouble begin, now;
   PetscCall(PetscTime(&begin));
   EnergyBudget before = energyBudget(potential.scene(), potential.elements(), state, settings_.dynamic ? 1 : state.time);
@@ -176,6 +176,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
       if (report.converged && (adapts || settings_.estimate_error)) error = stepError(state, h);
       if (report.converged && adapts && !adapt(h, dt_min, error)) { // the state was not touched
         ++rejected;
+        in_vain += report.iterations;
         continue;
       }
     }
@@ -199,6 +200,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     }
     if (!report.converged) { // the state was not touched
       ++rejected;
+      in_vain += report.iterations;
       good = 0;
       dt = 0.5 * h;
       if (dt >= std::min(dt_min, (settings_.t_end - state.time) / 1024)) continue; // a short last step may be halved as often
@@ -225,11 +227,11 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     row.newton_iterations = report.iterations;
     row.line_search_trials = report.trials;
     row.negative_pivots = report.negative_pivots;
-    row.rejected_steps = rejected;
+    row.rejected_steps = std::exchange(rejected, 0);
+    row.rejected_iterations = std::exchange(in_vain, 0);
     PetscCall(PetscTime(&now));
     row.wall_seconds = now - begin;
     row.error_estimate = control.error_sum;
-    rejected = 0;
     PetscCall(observe(state, row));
   }
   *finished = true;

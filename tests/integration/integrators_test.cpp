@@ -42,7 +42,7 @@ void start(Simulation &sim, const LoopSettings &settings, const Scene &scene) {
 /// What a run did.
 struct Outcome {
   State state;
-  int steps = 0, iterations = 0, rejected = 0;
+  int steps = 0, iterations = 0, rejected = 0, in_vain = 0; ///< in_vain: iterations of rejected steps
   double estimate = 0;
   std::vector<double> times;
 };
@@ -56,6 +56,7 @@ Outcome runOn(Simulation &sim, const LoopSettings &settings) {
                   ++run.steps;
                   run.iterations += row.newton_iterations;
                   run.rejected += row.rejected_steps;
+                  run.in_vain += row.rejected_iterations;
                   run.estimate = row.error_estimate;
                   run.times.push_back(state.time);
                   return PetscErrorCode(0);
@@ -291,6 +292,7 @@ TEST(Adaptation, MeetsItsTolerance) {
     EXPECT_LT(errors[1], 0.5 * errors[0]) << name;
     EXPECT_GT(tight.steps, loose.steps) << name;
     EXPECT_GT(tight.rejected, 0) << name;
+    EXPECT_GE(tight.in_vain, tight.rejected) << name;
   }
 }
 
