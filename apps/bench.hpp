@@ -88,7 +88,7 @@ inline PetscErrorCode takeSteps(Simulation &simulation, const LoopSettings &sett
       state,
       [&](const State &, const Diagnostics &row) {
         ++taken->steps;
-        taken->newton_iterations += row.newton_iterations;
+        taken->newton_iterations += row.newton_iterations + row.rejected_iterations;
         taken->rejected += row.rejected_steps;
         return PetscErrorCode(0);
       },

@@ -249,8 +249,9 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
   const double first = settings_.dt / direction.factor; // as long as a load step of dt
   const double shortest = first * (settings_.dt_min > 0 ? settings_.dt_min / settings_.dt : 1.0 / 1024);
   double length = first;
-  int rejected = 0;
-  EnergyBudget before = energyBudget(potential.scene(), potential.elements(), state, state.time);
+  int rejected = 0, in_vain = 0; // steps since the last one accepted, and their iterations
+  auto energyOf = [&](const State &at) { return energyBudget(potential.scene(), potential.elements(), at, potential.iterate(), at.time); };
+  EnergyBudget before = energyOf(state);
   for (int taken = 0; taken < settings_.arclength_steps && state.time < settings_.t_end;) {
     const State start = state;
     const Point before_step = last_;
@@ -278,6 +279,7 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     if (!converged) { // the state was not touched
       last_ = before_step;
       ++rejected;
+      in_vain += iterations_;
       length *= 0.5;
       if (length >= shortest) continue;
       std::ostringstream message;
@@ -288,17 +290,19 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     }
     std::swap(direction, end);
     potential.commit(state);
+    const EnergyBudget energy = energyOf(state);
     ++taken;
     if (slope * direction.factor < 0) PetscCall(locateLimit(start, before_step, {slope, direction.factor}, length));
     Diagnostics row;
     row.time = state.time;
     row.dt = std::sqrt(product(last_, last_));
-    row.energy = energyBudget(potential.scene(), potential.elements(), state, state.time);
-    row.dissipated = before.total() - row.energy.total();
-    before = row.energy;
+    row.energy = energy;
+    row.dissipated = before.total() - energy.total();
+    before = energy;
     row.newton_iterations = iterations_;
     row.negative_pivots = negative_;
     row.rejected_steps = std::exchange(rejected, 0);
+    row.rejected_iterations = std::exchange(in_vain, 0);
     PetscCall(PetscTime(&now));
     row.wall_seconds = now - begin;
     PetscCall(observe(state, row));

@@ -31,7 +31,7 @@ std::vector<double> loads(const Scene &scene, const std::vector<double> &length)
 using C = Configuration;
 
 IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, const Elements &elements, bool dynamic)
-    : scene_(scene), dofs_(dofs), elements_(elements), retraction_(elements, dofs), axial_(scene, elements), terms_(makeTerms(scene, elements, axial_, dynamic)),
+    : scene_(scene), dofs_(dofs), elements_(elements), retraction_(elements), axial_(scene, elements), terms_(makeTerms(scene, elements, axial_, dynamic)),
       start_(elements.slots), known_(elements.rods.size(), Known::nothing) {
   for (std::size_t r = 0; r < elements.rods.size(); ++r) {
     const RodRange &rod = elements.rods[r];
@@ -397,7 +397,7 @@ IncrementalPotential::Residual IncrementalPotential::residual() {
       rates.acceleration.vertex[v] = (rule.mass * velocity + rule.acceleration.atVertex(v)) * rate;
     }
     for (int i = 0; i < rod.edges; i += lanes) {
-      const Pack spun = spinOver(twistReference(), iterate_, rod.slot(i)).total;
+      const Pack spun = spinOver(twistReference(), iterate_, rod.slot(i));
       for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) {
         const int e = rod.first_edge + i + l;
         const double d = spun[l], velocity = d * rate + rule.velocity.atEdge(e);
@@ -423,7 +423,7 @@ bool IncrementalPotential::moveOn(double time) {
     const RodRange &rod = elements_.rods[r];
     for (int i = 0; i < rod.vertices; ++i) increment.setVector(0, rod.slot(i), iterate_.positionAt(rod.slot(i)) - start_.positionAt(rod.slot(i)));
     for (int i = 0; rod.twist && i < rod.edges; i += lanes) {
-      const Pack spun = spinOver(twistReference(), iterate_, rod.slot(i)).total;
+      const Pack spun = spinOver(twistReference(), iterate_, rod.slot(i));
       for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) increment[3][rod.slot(i + l)] = spun[l];
     }
     dofs_.copyBehindRing(rod, increment);
@@ -445,7 +445,7 @@ void IncrementalPotential::commit(State &state, RodSet rods) const {
     const double rate = 1 / step_.dt;
     for (int i = 0; i < rod.vertices; ++i) state.velocity[rod.first_vertex + i] = (iterate_.positionAt(rod.slot(i)) - start_.positionAt(rod.slot(i))) * rate;
     for (int i = 0; i < rod.edges; i += lanes) {
-      const Pack spun = spinOver(start_, iterate_, rod.slot(i)).total * Pack(rate);
+      const Pack spun = spinOver(start_, iterate_, rod.slot(i)) * Pack(rate);
       for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) state.twist_rate[rod.first_edge + i + l] = spun[l];
     }
   }

@@ -35,8 +35,7 @@ PetscErrorCode TimeLoop::locate(State &start, const Step &step, bool *stop) {
 PetscErrorCode TimeLoop::solveStages(const State &start, const Step &step, NewtonReport *report) {
   PetscFunctionBeginUser;
   IncrementalPotential &potential = solver_.potential();
-  const std::vector<Rod> &rods = potential.scene().rods;
-  const bool dissipates = std::any_of(rods.begin(), rods.end(), [](const Rod &rod) { return rod.material.stiffness_damping_coefficient != 0; });
+  const bool dissipates = potential.scene().stiffnessDissipates();
   const int count = integrator_->stages(start);
   stages_.clear();
   stages_.reserve(count);
@@ -44,7 +43,7 @@ PetscErrorCode TimeLoop::solveStages(const State &start, const Step &step, Newto
     const StageRule rule = integrator_->stage(start, step.dt, stages_);
     Step stage = step;
     stage.dt = rule.dt;
-    stage.rule = settings_.integrator.name == "euler" ? nullptr : &rule;
+    stage.rule = integrator_->leavesChords() ? nullptr : &rule;
     if (rule.fraction != 1) stage.time = start.time + rule.fraction * step.dt;
     NewtonReport one;
     PetscCall(solver_.solve(start, stage, &one));
@@ -67,15 +66,14 @@ PetscErrorCode TimeLoop::solveStages(const State &start, const Step &step, Newto
 void TimeLoop::finishStages(State &state, double h) {
   const IncrementalPotential &potential = solver_.potential();
   const Scene &scene = potential.scene();
-  const bool keeps = integrator_->remembersStrains() &&
-                     std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &rod) { return rod.material.stiffness_damping_coefficient != 0; });
+  const bool keeps = integrator_->remembersStrains() && scene.stiffnessDissipates();
   if (keeps) state.strains = strainsOf(potential.elements(), potential.start());
   if (keeps && !integrator_->endsAtStage()) // as far beyond the middle
     std::transform(state.strains.begin(), state.strains.end(), stages_.back().strains.begin(), state.strains.begin(),
                    [](double start, double middle) { return 2 * middle - start; });
   integrator_->finish(state, h, stages_);
   if (!state.memory.empty()) state.last_dt = h;
-  if (integrator_->order() == 1) return; // its velocities are chords everywhere
+  if (integrator_->leavesChords()) return; // of held vertices, too
   for (const Support &support : scene.supports) {
     if (!support.holdsPosition()) continue;
     const int v = potential.elements().rods[support.rod].first_vertex + support.vertex;
@@ -145,12 +143,12 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
   int &good = control.good;
   bool &stable = control.stable;
   if (settings_.dynamic && state.memory.empty()) PetscCall(integrator_->begin(solver_, dt, state));
-  int rejected = 0;
+  int rejected = 0, in_vain = 0; // steps since the last one accepted, and their iterations
   PetscLogDouble begin, now;
   PetscCall(PetscTime(&begin));
   EnergyBudget before = energyBudget(potential.scene(), potential.elements(), state, settings_.dynamic ? 1 : state.time);
   *finished = false;
-  const bool plain = !settings_.dynamic || (settings_.integrator.name == "euler" && !adapts && !settings_.estimate_error);
+  const bool plain = !settings_.dynamic || (integrator_->leavesChords() && !adapts && !settings_.estimate_error);
   State next = state; // what the blocks that have converged come to; the state itself stays as it is until all have
   EnergyBudget energy;
   while (state.time < settings_.t_end) {
@@ -176,6 +174,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
       if (report.converged && (adapts || settings_.estimate_error)) error = stepError(state, h);
       if (report.converged && adapts && !adapt(h, dt_min, error)) { // the state was not touched
         ++rejected;
+        in_vain += report.iterations;
         continue;
       }
     }
@@ -199,6 +198,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     }
     if (!report.converged) { // the state was not touched
       ++rejected;
+      in_vain += report.iterations;
       good = 0;
       dt = 0.5 * h;
       if (dt >= std::min(dt_min, (settings_.t_end - state.time) / 1024)) continue; // a short last step may be halved as often
@@ -225,11 +225,11 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     row.newton_iterations = report.iterations;
     row.line_search_trials = report.trials;
     row.negative_pivots = report.negative_pivots;
-    row.rejected_steps = rejected;
+    row.rejected_steps = std::exchange(rejected, 0);
+    row.rejected_iterations = std::exchange(in_vain, 0);
     PetscCall(PetscTime(&now));
     row.wall_seconds = now - begin;
     row.error_estimate = control.error_sum;
-    rejected = 0;
     PetscCall(observe(state, row));
   }
   *finished = true;

@@ -41,7 +41,7 @@ public:
       total += read<Pack>(elements_.mass() + s) * (c.positions<Pack>(s) - readVector<Pack>(predicted_, 0, s)).squaredNorm();
     if (rod.twist)
       for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
-        const Pack d = spinOver(*start_, c, s).total - read<Pack>(predicted_[3] + s);
+        const Pack d = spinOver(*start_, c, s) - read<Pack>(predicted_[3] + s);
         total += read<Pack>(elements_.twistMass() + s) * d * d;
       }
     return 0.5 * weight_[r] * reduce(total);
@@ -60,7 +60,7 @@ public:
     }
     if (!rod.twist) return;
     for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
-      const Pack difference = spinOver(*start_, c, s).total - read<Pack>(predicted_[3] + s);
+      const Pack difference = spinOver(*start_, c, s) - read<Pack>(predicted_[3] + s);
       const auto d = twistInertia<Pack>(start_->frames<Pack>(s), c.frames<Pack>(s), Pack(weight_[r]) * read<Pack>(elements_.twistMass() + s), difference);
       // What belongs to the first vertex of the edges before what belongs to the second, whose memory overlaps (see cellDerivatives).
       addTo(out.equilibrium[3] + s, d.gradient[3]);

@@ -67,11 +67,14 @@ EnergyBudget &EnergyBudget::operator+=(const EnergyBudget &other) {
   return *this;
 }
 
-EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, double load_factor) {
+EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, const Configuration &c, double load_factor) {
   EnergyBudget budget;
-  const Configuration c = configurationOf(state, scene, elements, state.time);
   for (int r = 0; r < int(elements.rods.size()); ++r) budget += energyBudget(scene, elements, state, c, load_factor, r);
   return budget;
+}
+
+EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, double load_factor) {
+  return energyBudget(scene, elements, state, configurationOf(state, scene, elements, state.time), load_factor);
 }
 
 } // namespace tendril

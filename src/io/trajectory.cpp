@@ -88,7 +88,8 @@ const std::vector<std::string> &Diagnostics::names() {
                                               "negative_pivots",
                                               "rejected_steps",
                                               "wall_seconds",
-                                              "error_estimate"};
+                                              "error_estimate",
+                                              "rejected_iterations"};
   return names;
 }
 
@@ -106,7 +107,8 @@ std::vector<double> Diagnostics::values() const {
           double(negative_pivots),
           double(rejected_steps),
           wall_seconds,
-          error_estimate};
+          error_estimate,
+          double(rejected_iterations)};
 }
 
 TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene, const Elements &elements, const Provenance &provenance,

@@ -42,6 +42,10 @@ Mat3 Motion::rotationAt(double time) const {
   return Eigen::AngleAxisd(angle, r / angle).toRotationMatrix();
 }
 
+bool Scene::stiffnessDissipates() const {
+  return std::any_of(rods.begin(), rods.end(), [](const Rod &rod) { return rod.material.stiffness_damping_coefficient != 0; });
+}
+
 void setBishopDirectors(Rod &rod, const Vec3 &start) {
   const int ne = rod.edges();
   rod.director.resize(ne);

@@ -24,7 +24,7 @@ bool anyLane(const Pack::mask_type &m) { return any_of(m); }
 
 } // namespace
 
-Retraction::Retraction(const Elements &elements, const DofMap &) : elements_(elements), work_(work_planes, elements.slots) { setInverseTimeSquared(0); }
+Retraction::Retraction(const Elements &elements) : elements_(elements), work_(work_planes, elements.slots) { setInverseTimeSquared(0); }
 
 void Retraction::setInverseTimeSquared(double value) {
   if (value == inverse_time_squared_) return;

@@ -354,12 +354,13 @@ TEST(TimeLoop, HalvesTheStepAndRecoversIt) {
   EXPECT_PETSC(SNESSetTolerances(sim.solver.snes(), 0, 1e-6, 0, 5, PETSC_MAX_INT));
   TimeLoop loop(sim.solver, settings);
   bool finished = false;
-  int rejected = 0;
+  int rejected = 0, in_vain = 0;
   double smallest = 1, last = 0;
   EXPECT_PETSC(loop.run(
       sim.state,
       [&](const State &, const Diagnostics &row) {
         rejected += row.rejected_steps;
+        in_vain += row.rejected_iterations;
         smallest = std::min(smallest, row.dt);
         last = row.dt;
         return PetscErrorCode(0);
@@ -367,6 +368,7 @@ TEST(TimeLoop, HalvesTheStepAndRecoversIt) {
       &finished));
   EXPECT_TRUE(finished) << loop.failure();
   EXPECT_GT(rejected, 0);
+  EXPECT_EQ(in_vain, 5 * rejected); // each went on to the limit
   EXPECT_LT(smallest, 0.2);
   EXPECT_GT(last, smallest);
   EXPECT_DOUBLE_EQ(sim.state.time, 2);

@@ -1,6 +1,8 @@
 /// Time integrators: their orders, what they keep, exact solutions, adapted steps.
 #include "support/rods.hpp"
 
+#include "tendril/io/scene_reader.hpp"
+
 namespace tendril::test {
 namespace {
 
@@ -40,7 +42,7 @@ void start(Simulation &sim, const LoopSettings &settings, const Scene &scene) {
 /// What a run did.
 struct Outcome {
   State state;
-  int steps = 0, iterations = 0, rejected = 0;
+  int steps = 0, iterations = 0, rejected = 0, in_vain = 0; ///< in_vain: iterations of rejected steps
   double estimate = 0;
   std::vector<double> times;
 };
@@ -54,6 +56,7 @@ Outcome runOn(Simulation &sim, const LoopSettings &settings) {
                   ++run.steps;
                   run.iterations += row.newton_iterations;
                   run.rejected += row.rejected_steps;
+                  run.in_vain += row.rejected_iterations;
                   run.estimate = row.error_estimate;
                   run.times.push_back(state.time);
                   return PetscErrorCode(0);
@@ -289,6 +292,7 @@ TEST(Adaptation, MeetsItsTolerance) {
     EXPECT_LT(errors[1], 0.5 * errors[0]) << name;
     EXPECT_GT(tight.steps, loose.steps) << name;
     EXPECT_GT(tight.rejected, 0) << name;
+    EXPECT_GE(tight.in_vain, tight.rejected) << name;
   }
 }
 
@@ -304,6 +308,29 @@ TEST(Adaptation, LandsOnTheTimesOfFrames) {
   }
   for (const double t : {0.1, 0.2, 0.3, 0.35})
     EXPECT_TRUE(std::any_of(run.times.begin(), run.times.end(), [&](double a) { return std::abs(a - t) < 1e-15; })) << t;
+}
+
+/// Inertia turns what positions round into forces, in steps of microseconds more than -snes_rtol allows: Newton must not look for less than that. No load acts
+/// on the ring, and adapted steps begin where it starts from rest, short.
+TEST(Adaptation, TakesShortSteps) {
+  const Scene ring = readScene(std::string(TENDRIL_SOURCE_DIR) + "/data/scenes/twisted_ring.yaml").scene;
+  for (const std::string &name : integratorNames()) {
+    auto outcome = [&](const LoopSettings &settings) {
+      Simulation sim;
+      EXPECT_EQ(sim.setUp(ring, settings), PetscErrorCode(0));
+      return runOn(sim, settings);
+    };
+    LoopSettings begin = adapted(name, 5e-3, 1e-4, 1e-3);
+    begin.dt_atol = 1e-6;
+    EXPECT_LE(outcome(begin).rejected, 10) << name; // by the error, down from 5 ms, by at most ten times each
+    for (const double dt : {5e-6, 1e-8}) {
+      LoopSettings fixed = with(name, dt, 5 * dt);
+      fixed.dt_min = dt / 2;
+      const Outcome run = outcome(fixed);
+      EXPECT_EQ(run.rejected, 0) << name << " " << dt;
+      EXPECT_LE(run.iterations, 4 * run.steps) << name << " " << dt; // two stages
+    }
+  }
 }
 
 /// On a stiff rod Newton takes about as many iterations as on a soft one; midpoint, whose axial forces swing from step to step, more than twice as many.

@@ -20,6 +20,9 @@ public:
   virtual StageRule stage(const State &start, double h, const Stages &done) const = 0;
   /// Whether the last stage is the end of the step; else it is its middle.
   virtual bool endsAtStage() const { return true; }
+  /// Whether the velocities of states are the chords of steps, that and nothing else, as backward Euler's are. Its steps need no rule, Newton starts where
+  /// lengths go on as in the last step, and blocks of rods are committed as they converge.
+  virtual bool leavesChords() const { return false; }
   /// Whether State::strains is wanted, where stiffness dissipates.
   virtual bool remembersStrains() const { return false; }
   /// Fills the memory of a state that has none; most methods begin without.

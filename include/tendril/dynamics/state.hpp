@@ -119,15 +119,12 @@ template <class T> std::array<FrameOf<T>, 2> cellFrames(const Configuration &c, 
   return f;
 }
 
-/// Twist of a pack of edges since the start of a step, whole turns by continuity with the sum of the retractions; and those turns alone [rad].
-struct SpinOver {
-  Pack total, turns;
-};
-inline SpinOver spinOver(const Configuration &start, const Configuration &now, int slot) {
+/// Twist of a pack of edges since the start of a step, whole turns by continuity with the sum of the retractions [rad].
+inline Pack spinOver(const Configuration &start, const Configuration &now, int slot) {
   using std::floor;
   const Pack principal = halfAngleBetween(start.frames<Pack>(slot), now.frames<Pack>(slot)).angle();
   const Pack turns = Pack(2 * pi) * floor((read<Pack>(now[Configuration::spin] + slot) - principal) * Pack(0.5 / pi) + Pack(0.5));
-  return {principal + turns, turns};
+  return principal + turns;
 }
 
 /// Constants of a cell with its whole turns.

@@ -98,6 +98,8 @@ struct EnergyBudget {
 /// Of one rod. \param configuration that of the state
 EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, const Configuration &configuration, double load_factor, int rod);
 /// Of all rods.
+EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, const Configuration &configuration, double load_factor);
+/// The same, where the configuration is not at hand.
 EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, double load_factor);
 
 } // namespace tendril

@@ -97,6 +97,9 @@ struct Scene {
     /// Acceleration at a place: matrix() (x - centre).
     Mat3 matrix() const { return angular_velocity.squaredNorm() * Mat3::Identity() - angular_velocity * angular_velocity.transpose(); }
   } rotation;
+
+  /// Whether the stiffness of any rod dissipates.
+  bool stiffnessDissipates() const;
 };
 
 /// Fills the directors of a rod with discrete Bishop frames: `start` (or some normal of the first edge when zero) transported along the

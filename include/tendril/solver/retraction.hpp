@@ -14,7 +14,7 @@ enum class RetractionKind { additive, length, continued, kept };
 
 class Retraction {
 public:
-  Retraction(const Elements &elements, const DofMap &dofs);
+  explicit Retraction(const Elements &elements);
 
   /// Inertia of a step, 1/dt^2 [1/s^2]; weighs the corrections of spans held at both ends.
   void setInverseTimeSquared(double value);

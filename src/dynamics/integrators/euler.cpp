@@ -7,6 +7,7 @@ namespace {
 class Euler final : public Integrator {
 public:
   int order() const override { return 1; }
+  bool leavesChords() const override { return true; }
 
   StageRule stage(const State &start, double h, const Stages &) const override {
     StageRule rule;

@@ -2,8 +2,6 @@
 
 #include "tendril/model/scene.hpp"
 
-#include <algorithm>
-
 namespace tendril {
 namespace {
 
@@ -34,8 +32,7 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
   step.rule = &rest;
   solver.begin(state, step);
   std::vector<double> before;
-  if (std::any_of(potential.scene().rods.begin(), potential.scene().rods.end(),
-                  [](const Rod &rod) { return rod.material.stiffness_damping_coefficient != 0; })) {
+  if (potential.scene().stiffnessDissipates()) {
     const double moment = 1e-3 * h; // long enough for the strains to change by more than their rounding
     Planes back = potential.dofs().makePlanes();
     for (const RodRange &rod : elements.rods) {
