@@ -107,14 +107,16 @@ TimeLoop::StepError TimeLoop::stepError(const State &start, double h) const {
   return worst;
 }
 
-/// Length of the next step [s]: no sliver is left before the end, nor before a time at which adapted steps have to end.
+/// Length of the next step [s]: no sliver is left before a time at which a step has to end.
 double TimeLoop::nextStep(double time, double *landing) const {
   *landing = settings_.t_end;
-  if (settings_.adapt == Adaptation::none) return std::min(control.dt, settings_.t_end - time);
+  const bool fixed = settings_.adapt == Adaptation::none;
   const double interval = settings_.output_interval;
   if (interval > 0) *landing = std::min(settings_.t_end, interval * (1 + std::floor(time / interval * (1 + 1e-12))));
-  const double left = *landing - time, parts = std::max(1.0, std::ceil(left / control.dt * (1 - 1e-9)));
-  return left / parts;
+  const double left = *landing - time, parts = std::max(1.0, std::ceil(left / control.dt * (1 - 1e-9))), h = left / parts;
+  if (!fixed) return h;
+  if (interval == 0) return std::min(control.dt, left);
+  return std::abs(h - control.dt) < 1e-9 * control.dt ? control.dt : h; // dt itself where it divides the interval
 }
 
 /// Proportional-integral control of the step (Gustafsson, Lundh and Soederlind 1988): sets the next one, and tells whether this one is good enough.
@@ -155,7 +157,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     double landing;
     const double h = nextStep(state.time, &landing);
     Step step = stepOf(settings_, state, h);
-    if (adapts && std::abs(step.time - landing) < 1e-9 * h) step.time = landing;
+    if (std::abs(step.time - landing) < 1e-9 * h) step.time = landing;
     NewtonReport report;
     energy = {};
     auto addEnergy = [&](const State &end, int r) {

@@ -46,7 +46,7 @@ const std::vector<Entry> &entries() {
         {"bifurcation", "where stability is lost between load steps: off, locate (find the critical load and go on), or stop there (static)", "locate"},
         {"gravity", "acceleration of gravity, e.g. 0,-9.81,0 [m/s^2]", "(from the scene)"},
         {"output_dir", "folder for the results", "out"},
-        {"output_interval", "time between frames: the first step at or after each multiple is written; 0: every step [s]", "0"},
+        {"output_interval", "time between frames [s]; steps end at its multiples, shorter than dt where it is no divisor; 0: every step", "0"},
         {"checkpoint_interval", "steps between checkpoints; 0: only at the end", "0"},
         {"restart", "checkpoint of the same scene to go on from, to the same bits; the results go to another folder", "(none)"},
         {"output_fields", "fields of a frame besides the position: all for " + joined(TrajectoryWriter::fieldNames()) + "; by name also " + joined(TrajectoryWriter::derivedFieldNames()), "all"},

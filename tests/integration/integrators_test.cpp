@@ -310,6 +310,24 @@ TEST(Adaptation, LandsOnTheTimesOfFrames) {
     EXPECT_TRUE(std::any_of(run.times.begin(), run.times.end(), [&](double a) { return std::abs(a - t) < 1e-15; })) << t;
 }
 
+/// Fixed steps that do not divide the time between frames are shortened evenly; those that do stay as they are to the last bit.
+TEST(FixedSteps, LandOnTheTimesOfFrames) {
+  LoopSettings settings = dynamics(0.03, 0.35);
+  settings.output_interval = 0.1;
+  double last = 0;
+  std::vector<double> steps;
+  for (const double t : swing(settings, 1e4).times) {
+    steps.push_back(t - last);
+    last = t;
+  }
+  ASSERT_EQ(steps.size(), 14u); // 3 x 4 of 0.025, 2 of 0.025
+  for (const double h : steps) EXPECT_NEAR(h, 0.025, 1e-12);
+  settings.dt = 0.02;
+  const std::vector<double> with = swing(settings, 1e4).times;
+  EXPECT_EQ(with[0], 0.02);
+  EXPECT_EQ(with[3] - with[2], 0.08 - 0.06);
+}
+
 /// Inertia turns what positions round into forces, in steps of microseconds more than -snes_rtol allows: Newton must not look for less than that. No load acts
 /// on the ring, and adapted steps begin where it starts from rest, short.
 TEST(Adaptation, TakesShortSteps) {

@@ -25,7 +25,7 @@ struct LoopSettings {
   Adaptation adapt = Adaptation::none;
   double dt_rtol = 1e-3, dt_atol = 1e-6; ///< error of a step over rod lengths: at most atol + rtol x what it moved
   double dt_max = 0;                     ///< of adapted steps; 0: no bound [s]
-  double output_interval = 0;            ///< adapted steps end at its multiples; 0: anywhere [s]
+  double output_interval = 0;            ///< steps end at its multiples; 0: anywhere [s]
   bool estimate_error = false;           ///< also of steps that are not adapted
   double dt = 1e-2, dt_min = 0, t_end = 1; ///< in statics time is the load factor and ends at 1
   Continuation continuation = Continuation::load;
