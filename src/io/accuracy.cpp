@@ -29,8 +29,7 @@ void Choice::say(const std::string &line) {
 void Choice::sayEdges(const Scene &scene, const Accuracy &accuracy) {
   constexpr std::size_t most_lines = 4;
   auto errors = [&](std::size_t r) {
-    return shortText(error[r]) +
-           (step_error.empty() ? "" : " (" + shortText(error[r] - step_error[r]) + " by the edges, " + shortText(step_error[r]) + " by the steps)");
+    return shortText(error[r]) + (step_error.empty() ? "" : " (" + shortText(edge_error[r]) + " by the edges, " + shortText(step_error[r]) + " by the steps)");
   };
   std::map<std::pair<int, std::string>, int> alike;
   std::vector<std::size_t> first; // of those alike

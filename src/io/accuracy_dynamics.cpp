@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <numeric>
+#include <optional>
 
 namespace tendril {
 namespace {
@@ -10,6 +11,8 @@ namespace {
 constexpr int sample_count = 32;    ///< in the time of a run; also the fewest steps
 constexpr double negligible = 0.05; ///< part of the tolerance that needs no order
 constexpr double least_order = 0.7; ///< below, halving tells nothing of the error that is left
+constexpr double fair_order = 0.6;  ///< of the formal order; below, the order may still rise with shorter steps or edges,
+constexpr double settled = 0.15;         ///< unless it changes by less than this from one doubling to the next
 constexpr double reach = 1.5;       ///< how far beyond its runs a prediction is trusted
 constexpr int most_growth = 4;      ///< of the coarsest runs from round to round: a first estimate may be far off
 constexpr double most_steps = 1e7;
@@ -23,25 +26,43 @@ struct Resolution {
   auto operator<=>(const Resolution &) const = default;
 };
 
-/// Error of the finest of three runs, each with half the step or edge of the one before, by the ratio of their differences (Aitken).
+/// Error of the finest of three runs of a rod, each with half the step or edge of the one before, by the ratio of their differences (Aitken).
 struct Trend {
   double error = 0, order = 0; ///< not above the formal one
   double seen = 0;             ///< the order as seen
   bool trusted = true;
+  Errors errors;                                                                      ///< up to a factor
   double at(double refinement) const { return error * std::pow(refinement, -order); } ///< with steps or edges so many times those of the finest
 };
 
-Trend trendOf(double first, double second, int formal, double tolerance) {
+/// \param before the order seen with longer steps or edges, if any
+Trend trendOf(const Errors &first, Errors second, int formal, double tolerance, std::optional<double> before) {
   Trend t;
+  const double one = sizeOf(first), two = sizeOf(second);
   t.order = formal;
-  if (second > 0 && first > 0) t.seen = std::log2(first / second);
-  if (second > negligible * tolerance) {
-    t.trusted = t.seen >= least_order;
+  if (one > 0 && two > 0) t.seen = std::log2(one / two);
+  if (two > negligible * tolerance) {
+    t.trusted = t.seen >= std::max(least_order, fair_order * formal) || (t.seen >= least_order && before && std::abs(t.seen - *before) < settled);
     t.order = std::clamp(t.seen, least_order, double(formal));
   }
-  t.error = second / (std::pow(2, t.order) - 1);
+  t.error = two / (std::pow(2, t.order) - 1);
+  t.errors = std::move(second);
   return t;
 }
+
+/// What the edges may add to an error of the steps so that together they come to the tolerance; negative when nothing.
+double roomBeside(double step_error, double correlation, double tolerance) {
+  const double square = tolerance * tolerance - step_error * step_error * (1 - correlation * correlation);
+  return square < 0 ? -1 : std::sqrt(square) - correlation * step_error;
+}
+
+double together(double a, double b, double correlation) { return std::sqrt(a * a + b * b + 2 * correlation * a * b); }
+
+/// What three runs in steps and three in edges tell of each rod.
+struct Found {
+  std::vector<Trend> steps, edges;
+  std::vector<double> correlation; ///< of the two errors
+};
 
 class Chooser {
 public:
@@ -59,25 +80,26 @@ public:
     PetscFunctionBeginUser;
     Resolution base{first_, sample_count};
     for (;;) {
-      std::vector<Trend> steps, edges;
-      PetscCall(trends(base, &Chooser::withSteps, order_, &steps));
-      if (!converges(steps)) {
-        moreSteps(base, steps);
+      Found found;
+      PetscCall(trends(base, &Chooser::withSteps, order_, seen_steps_, &found.steps));
+      if (!converges(found.steps)) {
+        moreSteps(base, found.steps);
         continue;
       }
-      PetscCall(trends(base, &Chooser::withEdges, 2, &edges));
-      if (edges.empty()) {
-        moreSteps(base, edges);
+      PetscCall(trends(base, &Chooser::withEdges, 2, seen_edges_, &found.edges));
+      if (found.edges.empty()) {
+        moreSteps(base, {});
         continue;
       }
-      sayTrends(base, steps, edges);
-      if (!converges(edges)) {
-        moreEdges(base, edges);
+      say(base, found);
+      if (!converges(found.edges)) {
+        moreEdges(base, found.edges);
         continue;
       }
-      const Resolution best = cheapest(base, steps, edges);
+      for (std::size_t r = 0; r < found.edges.size(); ++r) found.correlation.push_back(correlation(found.edges[r].errors, found.steps[r].errors));
+      const Resolution best = cheapest(base, found);
       if (within(base, best)) {
-        take(base, best, steps, edges);
+        take(base, best, found);
         PetscFunctionReturn(0);
       }
       base = towards(base, best);
@@ -97,7 +119,8 @@ private:
   double landing_;            ///< adapted steps end at its multiples [s]
   std::vector<double> times_; ///< of the samples [s]
   std::map<Resolution, Samples> runs_;
-  std::string failure_; ///< of the last run that failed
+  std::vector<double> seen_steps_, seen_edges_; ///< orders seen last, per rod
+  std::string failure_;                         ///< of the last run that failed
   int probes_ = 0;
   double seconds_ = 0, work_ = 0; ///< of all probes [s; edges x steps]
 
@@ -139,16 +162,21 @@ private:
     PetscFunctionReturn(0);
   }
 
-  /// Per rod, from runs refined once and twice; none where one fails.
-  PetscErrorCode trends(const Resolution &base, Resolution (Chooser::*refined)(const Resolution &, int) const, int formal, std::vector<Trend> *out) {
+  /// Per rod, from runs refined once and twice; none where one fails. \param before orders seen last, replaced by those seen now
+  PetscErrorCode trends(const Resolution &base, Resolution (Chooser::*refined)(const Resolution &, int) const, int formal, std::vector<double> &before,
+                        std::vector<Trend> *out) {
     PetscFunctionBeginUser;
     const Samples *run[3];
     for (int k = 0; k < 3; ++k) {
       PetscCall(probe((this->*refined)(base, 1 << k), &run[k]));
       if (!run[k]->failure.empty()) PetscFunctionReturn(0);
     }
-    const std::vector<double> first = distances(scene_, *run[0], *run[1], accuracy_.of), second = distances(scene_, *run[1], *run[2], accuracy_.of);
-    for (std::size_t r = 0; r < first.size(); ++r) out->push_back(trendOf(first[r], second[r], formal, accuracy_.tolerance));
+    const std::vector<Errors> first = difference(scene_, *run[0], *run[1], base.edges, accuracy_.of);
+    std::vector<Errors> second = difference(scene_, *run[1], *run[2], base.edges, accuracy_.of);
+    for (std::size_t r = 0; r < first.size(); ++r)
+      out->push_back(trendOf(first[r], std::move(second[r]), formal, accuracy_.tolerance, r < before.size() ? std::optional(before[r]) : std::nullopt));
+    before.clear();
+    for (const Trend &t : *out) before.push_back(t.seen);
     PetscFunctionReturn(0);
   }
 
@@ -187,31 +215,32 @@ private:
     }
   }
 
-  void sayTrends(const Resolution &base, const std::vector<Trend> &steps, const std::vector<Trend> &edges) {
-    const std::size_t r = worst(edges);
+  void say(const Resolution &base, const Found &found) {
+    const std::size_t r = worst(found.edges);
+    const std::string finest = shortText(adapts_ ? settingsAt(4 * base.steps).dt_rtol : settingsAt(4 * base.steps).dt);
     choice_.say("accuracy: " + std::to_string(base.edges[r]) + " to " + std::to_string(4 * base.edges[r]) + " edges of rod '" + scene_.rods[r].name + "', " +
-                stepText(base.steps) + " to " + shortText(adapts_ ? settingsAt(4 * base.steps).dt_rtol : settingsAt(4 * base.steps).dt) +
-                ": estimated error of the " + nameOf(accuracy_.of) + " " + text(edges[r]) + " by the edges, " + text(steps[worst(steps)]) + " by the steps");
+                stepText(base.steps) + " to " + finest + ": estimated error of the " + nameOf(accuracy_.of) + " " + text(found.edges[r]) + " by the edges, " +
+                text(found.steps[worst(found.steps)]) + " by the steps");
   }
 
-  /// The least edges x steps for which the two errors of each rod add up to the tolerance. For one rod with errors a/N^2 and b/n^p that is where
-  /// a/N^2 : b/n^p = p : 2 (Lagrange's multiplier of the sum).
-  Resolution cheapest(const Resolution &base, const std::vector<Trend> &steps, const std::vector<Trend> &edges) const {
+  /// The least edges x steps for which the two errors of each rod together come to the tolerance. For one rod with errors a/N^2 and b/n^p that add up
+  /// that is where a/N^2 : b/n^p = p : 2 (Lagrange's multiplier), their squares where the two have nothing to do with each other.
+  Resolution cheapest(const Resolution &base, const Found &found) const {
     Resolution best{{}, 0};
     double least = std::numeric_limits<double>::infinity();
-    for (double n = base.steps; n <= 4 * most_steps; n *= 1.01) {
+    for (double n = std::max(sample_count, base.steps / 2); n <= 4 * most_steps; n *= 1.01) {
       Resolution r{{}, int(std::ceil(n * (1 - 1e-12)))};
-      for (std::size_t k = 0; k < edges.size(); ++k) {
-        const double left = aim * accuracy_.tolerance - steps[k].at(n / (4.0 * base.steps));
-        if (left <= 0) break;
-        const double count = 4.0 * base.edges[k] * std::pow(edges[k].error / left, 1 / edges[k].order);
-        r.edges.push_back(count > 1e8 ? int(1e8) : std::max(base.edges[k], roundedUp(count, multiple_[k])));
+      for (std::size_t k = 0; k < found.edges.size(); ++k) {
+        const Trend &edges = found.edges[k];
+        const double room = roomBeside(found.steps[k].at(n / (4.0 * base.steps)), found.correlation[k], aim * accuracy_.tolerance);
+        if (room <= 0) break;
+        const double count = std::min(4.0 * base.edges[k] * std::pow(edges.error / room, 1 / edges.order), 1e8);
+        r.edges.push_back(std::max(first_[k], roundedUp(std::max(count, 0.5 * base.edges[k]), multiple_[k])));
       }
-      const double work = std::accumulate(r.edges.begin(), r.edges.end(), 0.0) * r.steps;
-      if (r.edges.size() == edges.size() && work < least) {
-        least = work;
-        best = r;
-      }
+      if (r.edges.size() < found.edges.size()) continue;
+      const double work = total(r.edges) * r.steps;
+      if (work < least) best = r;
+      least = std::min(least, work);
       if (work > 4 * least) break;
     }
     if (best.steps == 0 || best.steps > most_steps)
@@ -219,6 +248,8 @@ private:
                        (order_ < 2 ? " or an -integrator of second order" : ""));
     return best;
   }
+
+  static double total(const std::vector<int> &edges) { return std::accumulate(edges.begin(), edges.end(), 0.0); }
 
   static bool within(const Resolution &base, const Resolution &best) {
     bool all = best.steps <= reach * 4 * base.steps;
@@ -239,20 +270,21 @@ private:
     return next;
   }
 
-  void take(const Resolution &base, const Resolution &best, const std::vector<Trend> &steps, const std::vector<Trend> &edges) {
+  void take(const Resolution &base, const Resolution &best, const Found &found) {
     choice_.edges = best.edges;
     choice_.loop = settingsAt(best.steps);
-    for (std::size_t r = 0; r < edges.size(); ++r) {
-      choice_.step_error.push_back(steps[r].at(best.steps / (4.0 * base.steps)));
-      choice_.error.push_back(choice_.step_error[r] + edges[r].at(best.edges[r] / (4.0 * base.edges[r])));
+    const double finer = best.steps / (4.0 * base.steps);
+    for (std::size_t r = 0; r < found.edges.size(); ++r) {
+      choice_.step_error.push_back(found.steps[r].at(finer));
+      choice_.edge_error.push_back(found.edges[r].at(best.edges[r] / (4.0 * base.edges[r])));
+      choice_.error.push_back(together(choice_.edge_error[r], choice_.step_error[r], found.correlation[r]));
     }
-    const double finest = double(runs_.at(withSteps(base, 4)).steps);
-    const double run = std::accumulate(best.edges.begin(), best.edges.end(), 0.0) * finest * best.steps / (4.0 * base.steps);
+    const double work = total(best.edges) * double(runs_.at(withSteps(base, 4)).steps) * finer;
     choice_.sayEdges(scene_, accuracy_);
     choice_.say("accuracy: " +
                 (adapts_ ? "dt_rtol " + shortText(choice_.loop.dt_rtol) + ", dt_atol " + shortText(choice_.loop.dt_atol)
                          : "dt " + shortText(choice_.loop.dt) + " (" + std::to_string(best.steps) + " steps)") +
-                "; " + std::to_string(probes_) + " runs to find out took " + shortText(seconds_) + " s, " + shortText(work_ / run) +
+                "; " + std::to_string(probes_) + " runs to find out took " + shortText(seconds_) + " s, " + shortText(work_ / work) +
                 " times the edges x steps of the run");
   }
 };

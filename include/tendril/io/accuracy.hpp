@@ -20,10 +20,10 @@ struct Accuracy {
 
 /// What was chosen, with what was tried on the way, for the user.
 struct Choice {
-  std::vector<int> edges;         ///< per rod
-  std::vector<double> error;      ///< estimated, per rod; of the energy that of all rods
-  std::vector<double> step_error; ///< the part of it that the steps make; empty in statics
-  LoopSettings loop;              ///< settings of the run; in dynamics with the steps chosen
+  std::vector<int> edges;                     ///< per rod
+  std::vector<double> error;                  ///< estimated, per rod; of the energy that of all rods
+  std::vector<double> edge_error, step_error; ///< in dynamics those of the edges and the steps, per rod, that together make it
+  LoopSettings loop;                          ///< settings of the run; in dynamics with the steps chosen
   std::vector<std::string> lines;
   std::function<void(const std::string &)> tell; ///< told of each line at once, where set
 
