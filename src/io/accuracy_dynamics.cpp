@@ -8,13 +8,14 @@
 namespace tendril {
 namespace {
 
-constexpr int sample_count = 32;    ///< in the time of a run; also the fewest steps
-constexpr double negligible = 0.05; ///< part of the tolerance that needs no order
-constexpr double least_order = 0.7; ///< below, halving tells nothing of the error that is left
-constexpr double fair_order = 0.6;  ///< of the formal order; below, the order may still rise with shorter steps or edges,
-constexpr double settled = 0.15;         ///< unless it changes by less than this from one doubling to the next
-constexpr double reach = 1.5;       ///< how far beyond its runs a prediction is trusted
-constexpr int most_growth = 4;      ///< of the coarsest runs from round to round: a first estimate may be far off
+constexpr int sample_count = 32;      ///< in the time of a run; also the fewest steps
+constexpr double small = 0.25;        ///< part of the tolerance below which an error needs no order
+constexpr double least_order = 0.7;   ///< below, halving tells nothing of the error that is left
+constexpr double fair_order = 0.6;    ///< of the formal order; below, the order may still rise with shorter steps or edges, unless
+constexpr double settled_order = 0.9; ///< it is at least this, as of methods that lose one,
+constexpr double settled = 0.15;      ///< and changes by less than this from one doubling to the next
+constexpr double reach = 1.5;         ///< how far beyond its runs a prediction is trusted
+constexpr int most_growth = 4;        ///< of the coarsest runs from round to round: a first estimate may be far off
 constexpr double most_steps = 1e7;
 constexpr int most_coarse_steps = 4096; ///< or 4 times those of the scene: what does not converge there is given up
 constexpr int most_coarse_factor = 64;  ///< of the first edges, or 4 times those of the scene
@@ -26,26 +27,46 @@ struct Resolution {
   auto operator<=>(const Resolution &) const = default;
 };
 
-/// Error of the finest of three runs of a rod, each with half the step or edge of the one before, by the ratio of their differences (Aitken).
+/// Errors of three runs of a rod, each with half the step or edge of the one before, by the ratio of their differences (Aitken).
 struct Trend {
-  double error = 0, order = 0; ///< not above the formal one
+  double error[3] = {0, 0, 0}; ///< of the coarsest to the finest
   double seen = 0;             ///< the order as seen
+  double order = 0;            ///< taken for what is finer; not above the formal one
+  int formal = 2;
   bool trusted = true;
-  Errors errors;                                                                      ///< up to a factor
-  double at(double refinement) const { return error * std::pow(refinement, -order); } ///< with steps or edges so many times those of the finest
+  Errors errors; ///< of the second, up to a factor
+
+  double finest() const { return error[2]; }
+  /// With steps or edges so many times those of the finest run.
+  double at(double refinement) const {
+    const double level = 2 + std::log2(refinement);
+    if (level >= 2) return error[2] * std::pow(refinement, -order);
+    if (level <= 0) return error[0] * std::exp2(-formal * level);
+    const int k = int(level);
+    return error[k] * std::pow(error[k + 1] / std::max(error[k], 1e-300), level - k);
+  }
+  /// The least refinement at which the error is not above this.
+  double reaching(double target) const {
+    if (target <= error[2]) return std::pow(error[2] / target, 1 / order);
+    if (target >= error[0]) return 0.25 * std::pow(error[0] / target, 1.0 / formal);
+    const int k = target >= error[1] ? 0 : 1;
+    return 0.25 * std::exp2(k + std::log(error[k] / target) / std::log(error[k] / error[k + 1]));
+  }
 };
 
 /// \param before the order seen with longer steps or edges, if any
 Trend trendOf(const Errors &first, Errors second, int formal, double tolerance, std::optional<double> before) {
   Trend t;
   const double one = sizeOf(first), two = sizeOf(second);
-  t.order = formal;
   if (one > 0 && two > 0) t.seen = std::log2(one / two);
-  if (two > negligible * tolerance) {
-    t.trusted = t.seen >= std::max(least_order, fair_order * formal) || (t.seen >= least_order && before && std::abs(t.seen - *before) < settled);
-    t.order = std::clamp(t.seen, least_order, double(formal));
-  }
-  t.error = two / (std::pow(2, t.order) - 1);
+  t.formal = formal;
+  t.order = two > 0 ? std::clamp(t.seen, least_order, double(formal)) : formal;
+  t.error[2] = two / (std::pow(2, t.order) - 1);
+  t.error[1] = two + t.error[2];
+  t.error[0] = std::max(one, two) + t.error[1];
+  const bool fair = t.seen >= std::max(least_order, fair_order * formal);
+  const bool lasts = before && t.seen >= settled_order && std::abs(t.seen - *before) < settled;
+  t.trusted = fair || lasts || t.error[2] <= small * tolerance;
   t.errors = std::move(second);
   return t;
 }
@@ -185,10 +206,10 @@ private:
   }
   static std::size_t worst(const std::vector<Trend> &trends) {
     return std::max_element(trends.begin(), trends.end(),
-                            [](const Trend &a, const Trend &b) { return std::pair(!a.trusted, a.error) < std::pair(!b.trusted, b.error); }) -
+                            [](const Trend &a, const Trend &b) { return std::pair(!a.trusted, a.finest()) < std::pair(!b.trusted, b.finest()); }) -
            trends.begin();
   }
-  static std::string text(const Trend &t) { return shortText(t.error) + " (order " + shortText(t.seen) + ")"; }
+  static std::string text(const Trend &t) { return shortText(t.finest()) + " (order " + shortText(t.seen) + ")"; }
 
   [[noreturn]] void giveUp(const std::string &what) const {
     throw SceneError(askedFor(accuracy_) + ": " + what +
@@ -234,7 +255,7 @@ private:
         const Trend &edges = found.edges[k];
         const double room = roomBeside(found.steps[k].at(n / (4.0 * base.steps)), found.correlation[k], aim * accuracy_.tolerance);
         if (room <= 0) break;
-        const double count = std::min(4.0 * base.edges[k] * std::pow(edges.error / room, 1 / edges.order), 1e8);
+        const double count = std::min(4.0 * base.edges[k] * edges.reaching(room), 1e8);
         r.edges.push_back(std::max(first_[k], roundedUp(std::max(count, 0.5 * base.edges[k]), multiple_[k])));
       }
       if (r.edges.size() < found.edges.size()) continue;
