@@ -8,14 +8,15 @@
 namespace tendril {
 namespace {
 
-constexpr int sample_count = 32;      ///< in the time of a run; also the fewest steps
-constexpr double small = 0.25;        ///< part of the tolerance below which an error needs no order
-constexpr double least_order = 0.7;   ///< below, halving tells nothing of the error that is left
-constexpr double fair_order = 0.6;    ///< of the formal order; below, the order may still rise with shorter steps or edges, unless
-constexpr double settled_order = 0.9; ///< it is at least this, as of methods that lose one,
-constexpr double settled = 0.15;      ///< and changes by less than this from one doubling to the next
-constexpr double reach = 1.5;         ///< how far beyond its runs a prediction is trusted
-constexpr int most_growth = 4;        ///< of the coarsest runs from round to round: a first estimate may be far off
+constexpr int sample_count = 32;         ///< in the time of a run; also the fewest steps
+constexpr double small = 0.25;           ///< part of the tolerance below which an error needs no order
+constexpr double least_order = 0.7;      ///< below, halving tells nothing of the error that is left
+constexpr double fair_order = 0.6;       ///< of the formal order; below, the order may still rise with shorter steps or edges, unless
+constexpr double settled_order = 0.9;    ///< it is at least this, as of methods that lose one,
+constexpr double settled = 0.15;         ///< and changes by less than this from one doubling to the next
+constexpr double reach = 1.5;            ///< how far beyond its runs a prediction is trusted
+constexpr double start_tolerance = 1e-2; ///< -dt_rtol of the run that tells whether steps are short enough at the start
+constexpr int most_growth = 4;           ///< of the coarsest runs from round to round: a first estimate may be far off
 constexpr double most_steps = 1e7;
 constexpr int most_coarse_steps = 4096; ///< or 4 times those of the scene: what does not converge there is given up
 constexpr int most_coarse_factor = 64;  ///< of the first edges, or 4 times those of the scene
@@ -104,12 +105,21 @@ public:
       Found found;
       PetscCall(trends(base, &Chooser::withSteps, order_, seen_steps_, &found.steps));
       if (!converges(found.steps)) {
-        moreSteps(base, found.steps);
+        moreSteps(base, found.steps.empty() ? failure_ : "no convergence" + between(base) + text(found.steps[worst(found.steps)]));
         continue;
+      }
+      if (bool resolved; !start_resolved_) {
+        PetscCall(resolvesStart(base, &resolved));
+        if (!resolved) {
+          moreSteps(base,
+                    "steps" + between(base) + text(found.steps[worst(found.steps)]) + ", but they miss motion in the first " + shortText(times_[0]) + " s");
+          continue;
+        }
+        start_resolved_ = true;
       }
       PetscCall(trends(base, &Chooser::withEdges, 2, seen_edges_, &found.edges));
       if (found.edges.empty()) {
-        moreSteps(base, {});
+        moreSteps(base, failure_);
         continue;
       }
       say(base, found);
@@ -142,6 +152,8 @@ private:
   std::map<Resolution, Samples> runs_;
   std::vector<double> seen_steps_, seen_edges_; ///< orders seen last, per rod
   std::string failure_;                         ///< of the last run that failed
+  bool start_resolved_ = false;
+  Samples start_; ///< at the first of the times, by adapted steps
   int probes_ = 0;
   double seconds_ = 0, work_ = 0; ///< of all probes [s; edges x steps]
 
@@ -169,14 +181,20 @@ private:
     return r;
   }
 
+  void count(const Samples &run) {
+    ++probes_;
+    seconds_ += run.seconds;
+    work_ += run.work();
+  }
+
   PetscErrorCode probe(const Resolution &resolution, const Samples **out) {
     PetscFunctionBeginUser;
     const auto [place, is_new] = runs_.try_emplace(resolution);
     if (is_new) {
-      PetscCall(sample(redraw(scene_, drawings_, resolution.edges), settingsAt(resolution.steps), times_, &place->second));
-      ++probes_;
-      seconds_ += place->second.seconds;
-      work_ += place->second.work();
+      LoopSettings s = settingsAt(resolution.steps);
+      if (s.dt_min == 0) s.dt_min = s.dt / 16; // where shorter ones are needed, all should be
+      PetscCall(sample(redraw(scene_, drawings_, resolution.edges), s, times_, &place->second));
+      count(place->second);
       if (!place->second.failure.empty()) failure_ = "with " + stepText(resolution.steps) + ", " + place->second.failure;
     }
     *out = &place->second;
@@ -217,13 +235,45 @@ private:
                      "-t_end or a larger tolerance");
   }
 
-  void moreSteps(Resolution &base, const std::vector<Trend> &steps) {
-    const std::string why = steps.empty() ? failure_
-                                          : "no convergence from " + stepText(base.steps) + " to " + stepText(4 * base.steps) + ", estimated error of the " +
-                                                nameOf(accuracy_.of) + " " + text(steps[worst(steps)]);
+  std::string between(const Resolution &base) const {
+    return " from " + stepText(base.steps) + " to " + stepText(4 * base.steps) + ", estimated error of the " + nameOf(accuracy_.of) + " ";
+  }
+
+  void moreSteps(Resolution &base, const std::string &why) {
     choice_.say("accuracy: " + why);
     base.steps *= 2;
     if (base.steps > std::max<double>(most_coarse_steps, 4 * settings_.t_end / settings_.dt)) giveUp(why);
+  }
+
+  /// Whether the series of steps is right in the first of the times, by adapted steps that begin with short ones: where steps are much longer than the motion,
+  /// methods that damp agree at all lengths on a rod at rest.
+  PetscErrorCode resolvesStart(const Resolution &base, bool *resolved) {
+    PetscFunctionBeginUser;
+    if (start_.edges.empty()) {
+      LoopSettings s = settings_;
+      s.integrator.name = "bdf2";
+      s.adapt = Adaptation::error;
+      s.dt_rtol = start_tolerance;
+      s.dt_atol = start_tolerance * accuracy_.tolerance;
+      s.t_end = times_[0];
+      s.dt = 1e-3 * s.t_end;
+      s.dt_min = 1e-5 * s.t_end;
+      s.dt_max = s.output_interval = 0;
+      PetscCall(sample(redraw(scene_, drawings_, base.edges), s, {times_[0]}, &start_));
+      count(start_);
+    }
+    *resolved = true;
+    if (!start_.failure.empty()) PetscFunctionReturn(0);
+    const Samples *run[3];
+    for (int k = 0; k < 3; ++k) PetscCall(probe(withSteps(base, 1 << k), &run[k]));
+    auto apart = [&](const Samples &a, const Samples &b, std::size_t r) {
+      return sizeOf(difference(scene_, a.first(), b.first(), base.edges, accuracy_.of)[r]);
+    };
+    for (std::size_t r = 0; r < scene_.rods.size(); ++r) {
+      const double expected = apart(*run[0], *run[1], r) + apart(*run[1], *run[2], r);
+      *resolved = *resolved && apart(*run[2], start_, r) <= 2 * expected + accuracy_.tolerance;
+    }
+    PetscFunctionReturn(0);
   }
 
   void moreEdges(Resolution &base, const std::vector<Trend> &edges) {

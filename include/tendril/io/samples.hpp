@@ -13,7 +13,8 @@ struct Samples {
   std::vector<double> elastic;             ///< energy of all rods at each time [J]
   long steps = 0;
   double seconds = 0;
-  double work() const; ///< edges x steps
+  double work() const;                                                                                      ///< edges x steps
+  Samples first() const { return {failure, edges, {position.front()}, {elastic.front()}, steps, seconds}; } ///< at the first time only
 };
 
 /// Runs a scene in dynamics to its end. Steps have to end at the times; where a rejected step put them off, that is a failure.
