@@ -231,8 +231,8 @@ private:
 
   [[noreturn]] void giveUp(const std::string &what) const {
     throw SceneError(askedFor(accuracy_) + ": " + what +
-                     ". Motion that grows from the smallest difference, as of what buckles or folds by chance, has no answer to converge to: write a smaller "
-                     "-t_end or a larger tolerance");
+                     ". Motion that the smallest difference changes, as of what buckles or folds by chance, has no answer to converge to; vibrations through very many "
+                     "periods need more steps than were tried. Write a smaller -t_end or a larger tolerance");
   }
 
   std::string between(const Resolution &base) const {
