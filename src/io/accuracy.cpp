@@ -1,5 +1,7 @@
 #include "tendril/io/accuracy.hpp"
 
+#include "tendril/model/alike.hpp"
+
 #include <algorithm>
 #include <iomanip>
 #include <map>
@@ -34,7 +36,7 @@ void Choice::sayEdges(const Scene &scene, const Accuracy &accuracy) {
   std::map<std::pair<int, std::string>, int> alike;
   std::vector<std::size_t> first; // of those alike
   for (std::size_t r = 0; r < scene.rods.size(); ++r)
-    if (alike[{edges[r], errors(r)}]++ == 0) first.push_back(r);
+    if (int &rods = alike[{edges[r], errors(r)}]; (rods += countOf(r)) == countOf(r)) first.push_back(r);
   for (std::size_t k = 0; k < std::min(first.size(), most_lines); ++k) {
     const std::size_t r = first[k];
     const int others = alike[{edges[r], errors(r)}] - 1;
@@ -151,6 +153,40 @@ PetscErrorCode chooseEdges(const Scene &scene, const std::vector<Drawing> &drawi
   }
   throw SceneError(asked + " was not reached: " + choice->lines.back().substr(std::string("accuracy: ").size()) + "; write a larger tolerance" +
                    (accuracy.tolerance < 1e-6 ? " or a smaller -snes_rtol" : ""));
+}
+
+PetscErrorCode chooseResolution(const Scene &scene, const std::vector<Drawing> &drawings, const LoopSettings &settings, const Accuracy &accuracy,
+                                Choice *choice) {
+  PetscFunctionBeginUser;
+  const std::vector<int> first = firstAlike(scene, drawings);
+  std::vector<int> kinds, kind_of(first.size()); // rods solved; which of them stands for each
+  std::vector<Drawing> kept;
+  choice->count.clear();
+  const bool together = accuracy.of == Quantity::energy && std::any_of(first.begin(), first.end(), [](int r) { return r != 0; });
+  for (int r = 0; r < int(first.size()); ++r) {
+    const bool own = first[r] == r || together;
+    kind_of[r] = own ? int(kinds.size()) : kind_of[first[r]];
+    if (!own) {
+      ++choice->count[kind_of[r]];
+      continue;
+    }
+    kinds.push_back(r);
+    kept.push_back(drawings[r]);
+    choice->count.push_back(1);
+  }
+  PetscCall((settings.dynamic ? chooseEdgesAndSteps : chooseEdges)(withRods(scene, kinds), kept, settings, accuracy, choice));
+  auto expand = [&](auto &values) {
+    auto all = values;
+    all.clear();
+    for (std::size_t r = 0; r < first.size() && !values.empty(); ++r) all.push_back(values[kind_of[r]]);
+    values = all;
+  };
+  expand(choice->edges);
+  expand(choice->error);
+  expand(choice->edge_error);
+  expand(choice->step_error);
+  choice->count.clear();
+  PetscFunctionReturn(0);
 }
 
 } // namespace tendril

@@ -18,8 +18,9 @@ constexpr double reach = 1.5;            ///< how far beyond its runs a predicti
 constexpr double start_tolerance = 1e-2; ///< -dt_rtol of the run that tells whether steps are short enough at the start
 constexpr int most_growth = 4;           ///< of the coarsest runs from round to round: a first estimate may be far off
 constexpr double most_steps = 1e7;
-constexpr int most_coarse_steps = 4096; ///< or 4 times those of the scene: what does not converge there is given up
+constexpr int most_coarse_steps = 4096; ///< or 4 times those of the scene
 constexpr int most_coarse_factor = 64;  ///< of the first edges, or 4 times those of the scene
+constexpr int more_tries = 8;           ///< where a prediction led to finer runs, so many times theirs
 
 /// How fine a run is. Adapted steps have a number too, by which their tolerance goes as an error of the integrator's order goes with steps.
 struct Resolution {
@@ -94,8 +95,10 @@ public:
     const double given = settings.output_interval, even = settings.t_end / sample_count;
     landing_ = given > 0 ? given / std::ceil(given / even) : even;
     const int stride = std::max(1, int(even / landing_ * (1 + 1e-9)));
-    for (int k = 1; k <= sample_count; ++k)
-      if (const double time = adapts_ ? k * stride * landing_ : k * even; time <= settings.t_end * (1 + 1e-12)) times_.push_back(time);
+    const double interval = adapts_ ? stride * landing_ : even;
+    for (int k = 1; k * interval <= settings.t_end * (1 + 1e-12); ++k) times_.push_back(k * interval);
+    most_.steps = int(std::clamp(4 * settings.t_end / settings.dt, double(most_coarse_steps), most_steps));
+    for (std::size_t r = 0; r < scene.rods.size(); ++r) most_.edges.push_back(std::max(most_coarse_factor * first_[r], 4 * scene.rods[r].edges()));
   }
 
   PetscErrorCode choose() {
@@ -149,6 +152,7 @@ private:
   bool adapts_;
   double landing_;            ///< adapted steps end at its multiples [s]
   std::vector<double> times_; ///< of the samples [s]
+  Resolution most_;           ///< of coarsest runs: what does not converge there is given up
   std::map<Resolution, Samples> runs_;
   std::vector<double> seen_steps_, seen_edges_; ///< orders seen last, per rod
   std::string failure_;                         ///< of the last run that failed
@@ -192,7 +196,7 @@ private:
     const auto [place, is_new] = runs_.try_emplace(resolution);
     if (is_new) {
       LoopSettings s = settingsAt(resolution.steps);
-      if (s.dt_min == 0) s.dt_min = s.dt / 16; // where shorter ones are needed, all should be
+      if (!adapts_ && s.dt_min == 0) s.dt_min = s.dt / 16; // where shorter ones are needed, all should be
       PetscCall(sample(redraw(scene_, drawings_, resolution.edges), s, times_, &place->second));
       count(place->second);
       if (!place->second.failure.empty()) failure_ = "with " + stepText(resolution.steps) + ", " + place->second.failure;
@@ -230,9 +234,10 @@ private:
   static std::string text(const Trend &t) { return shortText(t.finest()) + " (order " + shortText(t.seen) + ")"; }
 
   [[noreturn]] void giveUp(const std::string &what) const {
-    throw SceneError(askedFor(accuracy_) + ": " + what +
-                     ". Motion that the smallest difference changes, as of what buckles or folds by chance, has no answer to converge to; vibrations through very many "
-                     "periods need more steps than were tried. Write a smaller -t_end or a larger tolerance");
+    throw SceneError(
+        askedFor(accuracy_) + ": " + what +
+        ". Motion that the smallest difference changes, as of what buckles or folds by chance, has no answer to converge to; vibrations through very many "
+        "periods need more steps than were tried. Write a smaller -t_end or a larger tolerance");
   }
 
   std::string between(const Resolution &base) const {
@@ -242,7 +247,7 @@ private:
   void moreSteps(Resolution &base, const std::string &why) {
     choice_.say("accuracy: " + why);
     base.steps *= 2;
-    if (base.steps > std::max<double>(most_coarse_steps, 4 * settings_.t_end / settings_.dt)) giveUp(why);
+    if (base.steps > most_.steps) giveUp(why);
   }
 
   /// Whether the series of steps is right in the first of the times, by adapted steps that begin with short ones: where steps are much longer than the motion,
@@ -266,13 +271,9 @@ private:
     if (!start_.failure.empty()) PetscFunctionReturn(0);
     const Samples *run[3];
     for (int k = 0; k < 3; ++k) PetscCall(probe(withSteps(base, 1 << k), &run[k]));
-    auto apart = [&](const Samples &a, const Samples &b, std::size_t r) {
-      return sizeOf(difference(scene_, a.first(), b.first(), base.edges, accuracy_.of)[r]);
-    };
-    for (std::size_t r = 0; r < scene_.rods.size(); ++r) {
-      const double expected = apart(*run[0], *run[1], r) + apart(*run[1], *run[2], r);
-      *resolved = *resolved && apart(*run[2], start_, r) <= 2 * expected + accuracy_.tolerance;
-    }
+    auto apart = [&](const Samples &a, const Samples &b) { return difference(scene_, a.first(), b.first(), base.edges, Quantity::position); };
+    const std::vector<Errors> once = apart(*run[0], *run[1]), twice = apart(*run[1], *run[2]), all = apart(*run[2], start_);
+    for (std::size_t r = 0; r < all.size(); ++r) *resolved = *resolved && sizeOf(all[r]) <= 2 * (sizeOf(once[r]) + sizeOf(twice[r])) + accuracy_.tolerance;
     PetscFunctionReturn(0);
   }
 
@@ -280,7 +281,7 @@ private:
     for (std::size_t r = 0; r < edges.size(); ++r) {
       if (edges[r].trusted) continue;
       base.edges[r] *= 2;
-      if (base.edges[r] > std::max(most_coarse_factor * first_[r], 4 * scene_.rods[r].edges()) || 4 * base.edges[r] > most_edges)
+      if (base.edges[r] > most_.edges[r] || 4 * base.edges[r] > most_edges)
         giveUp("no convergence from " + std::to_string(base.edges[r] / 2) + " to " + std::to_string(2 * base.edges[r]) + " edges of rod '" +
                scene_.rods[r].name + "', estimated error " + text(edges[r]));
     }
@@ -320,7 +321,11 @@ private:
     return best;
   }
 
-  static double total(const std::vector<int> &edges) { return std::accumulate(edges.begin(), edges.end(), 0.0); }
+  double total(const std::vector<int> &edges) const {
+    double sum = 0;
+    for (std::size_t r = 0; r < edges.size(); ++r) sum += double(choice_.countOf(r)) * edges[r];
+    return sum;
+  }
 
   static bool within(const Resolution &base, const Resolution &best) {
     bool all = best.steps <= reach * 4 * base.steps;
@@ -329,11 +334,13 @@ private:
   }
 
   /// Coarsest runs for which the finest are about as fine as the best.
-  Resolution towards(const Resolution &base, const Resolution &best) const {
+  Resolution towards(const Resolution &base, const Resolution &best) {
     Resolution next = base;
     next.steps = std::clamp(roundedUp(best.steps / 4.0, sample_count), base.steps, most_growth * base.steps);
+    most_.steps = std::max(most_.steps, more_tries * next.steps);
     for (std::size_t r = 0; r < best.edges.size(); ++r) {
       next.edges[r] = std::clamp(roundedUp(best.edges[r] / 4.0, multiple_[r]), base.edges[r], most_growth * base.edges[r]);
+      most_.edges[r] = std::max(most_.edges[r], more_tries * next.edges[r]);
       if (4 * next.edges[r] > most_edges)
         throw SceneError(askedFor(accuracy_) + " needs about " + shortText(best.edges[r]) + " edges of rod '" + scene_.rods[r].name +
                          "', more than rounding allows; write a larger tolerance");

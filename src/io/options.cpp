@@ -31,7 +31,7 @@ const std::vector<Entry> &entries() {
     std::vector<Entry> l{
         {"scene", "scene file (YAML)", "(required)"},
         {"mode", "dynamic: steps in time; static: steps in load to an equilibrium", "(from the scene) dynamic"},
-        {"dt", "time step [s]", "(from the scene) 0.01"},
+        {"dt", "time step [s]; chosen where -accuracy is given", "(from the scene) 0.01"},
         {"integrator", integratorMeanings(), "euler"},
         {"rho_inf", "generalized_alpha: what is left of the highest frequencies after a step, 0 to 1", "0.8"},
         {"dt_adapt", "none: steps of -dt; error: as long as the estimated error of a step allows, beginning with -dt (dynamic)", "none"},

@@ -150,7 +150,7 @@ PetscErrorCode meetAccuracy(Prepared &prepared, Options &o, Choice *choice) {
     std::printf("%s\n", line.c_str());
     std::fflush(stdout);
   };
-  PetscCall((o.loop.dynamic ? chooseEdgesAndSteps : chooseEdges)(prepared.written, prepared.drawings, o.loop, *o.accuracy, choice));
+  PetscCall(chooseResolution(prepared.written, prepared.drawings, o.loop, *o.accuracy, choice));
   o.loop = choice->loop;
   PetscCall(makeReady(redraw(prepared.written, prepared.drawings, choice->edges), o, prepared.run));
   PetscFunctionReturn(0);

@@ -107,7 +107,8 @@ TEST(AccuracyInDynamics, IsMetOnASpring) {
     EXPECT_PETSC(chooseEdgesAndSteps(file.scene, file.drawings, settings, {1e-3, Quantity::tip}, &choice));
     const double error = rmsOfLast(positionsAt(times, redraw(file.scene, file.drawings, choice.edges), choice.loop), reference) / lengthOf(file.scene.rods[0]);
     EXPECT_LT(error, 1e-3);
-    EXPECT_GT(error, 1e-3 / 10) << "too dear, edges " << choice.edges[0] << (adapts ? ", dt_rtol " : ", dt ") << (adapts ? choice.loop.dt_rtol : choice.loop.dt);
+    EXPECT_GT(error, 1e-3 / 10) << "too dear, edges " << choice.edges[0] << (adapts ? ", dt_rtol " : ", dt ")
+                                << (adapts ? choice.loop.dt_rtol : choice.loop.dt);
     EXPECT_EQ(choice.loop.adapt == Adaptation::error, adapts);
   }
 }
@@ -123,6 +124,23 @@ TEST(AccuracyInDynamics, IsChosenRodByRod) {
   Choice choice;
   EXPECT_PETSC(chooseEdgesAndSteps(file.scene, file.drawings, settingsOf("generalized_alpha", 0.005, 0.5), {3e-3}, &choice));
   EXPECT_LT(choice.edges[1], choice.edges[0] / 2);
+}
+
+TEST(AccuracyInDynamics, OfCopiesIsThatOfOne) {
+  SceneFile file = sceneFile("cantilever");
+  const Accuracy accuracy{1e-2};
+  Choice one, all;
+  EXPECT_PETSC(chooseResolution(file.scene, file.drawings, settingsOf("generalized_alpha", 0.005, 0.5), accuracy, &one));
+  for (int r = 1; r < 3; ++r) {
+    file.scene.rods.push_back(file.scene.rods[0]);
+    file.drawings.push_back(file.drawings[0]);
+    file.scene.supports.push_back(file.scene.supports[0]);
+    file.scene.supports[r].rod = r;
+  }
+  EXPECT_PETSC(chooseResolution(file.scene, file.drawings, settingsOf("generalized_alpha", 0.005, 0.5), accuracy, &all));
+  EXPECT_EQ(all.edges, std::vector<int>(3, one.edges[0]));
+  EXPECT_EQ(all.error, std::vector<double>(3, one.error[0]));
+  EXPECT_EQ(all.loop.dt, one.loop.dt);
 }
 
 TEST(AccuracyInDynamics, SeesMotionShorterThanTheSteps) {
