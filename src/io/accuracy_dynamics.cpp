@@ -97,6 +97,8 @@ public:
     const int stride = std::max(1, int(even / landing_ * (1 + 1e-9)));
     const double interval = adapts_ ? stride * landing_ : even;
     for (int k = 1; k * interval <= settings.t_end * (1 + 1e-12); ++k) times_.push_back(k * interval);
+    if (const double frames = settings.t_end / std::max(given, 1e-300); std::abs(frames - std::round(frames)) < 1e-9 * frames && frames <= most_steps)
+      frames_ = std::max(1, int(std::round(frames)));
     most_.steps = int(std::clamp(4 * settings.t_end / settings.dt, double(most_coarse_steps), most_steps));
     for (std::size_t r = 0; r < scene.rods.size(); ++r) most_.edges.push_back(std::max(most_coarse_factor * first_[r], 4 * scene.rods[r].edges()));
   }
@@ -152,6 +154,7 @@ private:
   bool adapts_;
   double landing_;            ///< adapted steps end at its multiples [s]
   std::vector<double> times_; ///< of the samples [s]
+  int frames_ = 1;            ///< where steps are short against the time between frames, they divide it
   Resolution most_;           ///< of coarsest runs: what does not converge there is given up
   std::map<Resolution, Samples> runs_;
   std::vector<double> seen_steps_, seen_edges_; ///< orders seen last, per rod
@@ -301,10 +304,10 @@ private:
     Resolution best{{}, 0};
     double least = std::numeric_limits<double>::infinity();
     for (double n = std::max(sample_count, base.steps / 2); n <= 4 * most_steps; n *= 1.01) {
-      Resolution r{{}, int(std::ceil(n * (1 - 1e-12)))};
+      Resolution r{{}, roundedUp(n, n < 4.0 * frames_ || adapts_ ? 1 : frames_)};
       for (std::size_t k = 0; k < found.edges.size(); ++k) {
         const Trend &edges = found.edges[k];
-        const double room = roomBeside(found.steps[k].at(n / (4.0 * base.steps)), found.correlation[k], aim * accuracy_.tolerance);
+        const double room = roomBeside(found.steps[k].at(r.steps / (4.0 * base.steps)), found.correlation[k], aim * accuracy_.tolerance);
         if (room <= 0) break;
         const double count = std::min(4.0 * base.edges[k] * edges.reaching(room), 1e8);
         r.edges.push_back(std::max(first_[k], roundedUp(std::max(count, 0.5 * base.edges[k]), multiple_[k])));
