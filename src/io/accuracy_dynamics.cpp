@@ -1,9 +1,11 @@
 #include "tendril/io/samples.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <optional>
+#include <tuple>
 
 namespace tendril {
 namespace {
@@ -26,7 +28,7 @@ constexpr int more_tries = 8;           ///< where a prediction led to finer run
 struct Resolution {
   std::vector<int> edges; ///< per rod
   int steps;
-  auto operator<=>(const Resolution &) const = default;
+  bool operator<(const Resolution &other) const { return std::tie(edges, steps) < std::tie(other.edges, other.steps); }
 };
 
 /// Errors of three runs of a rod, each with half the step or edge of the one before, by the ratio of their differences (Aitken).

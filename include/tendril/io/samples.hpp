@@ -6,15 +6,18 @@
 
 namespace tendril {
 
+/// What is kept of a run.
 struct Samples {
   std::string failure;                     ///< why the run tells nothing; empty when it does
   std::vector<int> edges;                  ///< per rod
   std::vector<std::vector<Vec3>> position; ///< at each time (nv) [m]
   std::vector<double> elastic;             ///< energy of all rods at each time [J]
   long steps = 0;
-  double seconds = 0;
-  double work() const;                                                                                      ///< edges x steps
-  Samples first() const { return {failure, edges, {position.front()}, {elastic.front()}, steps, seconds}; } ///< at the first time only
+  double seconds = 0; ///< of the time loop
+  /// Edges x steps.
+  double work() const;
+  /// At the first time only.
+  Samples first() const { return {failure, edges, {position.front()}, {elastic.front()}, steps, seconds}; }
 };
 
 /// Runs a scene in dynamics to its end. Steps have to end at the times; where a rejected step put them off, that is a failure.

@@ -68,7 +68,7 @@ struct Support {
   enum class Kind { clamp, pin, fix_twist } kind;
   int rod, vertex;
   Motion motion;
-  Frame frame;                                        ///< reference frame at the vertex (clamp, fix_twist); length 1
+  Frame frame; ///< reference frame at the vertex (clamp, fix_twist); length 1
   bool tangent_given = false, director_given = false; ///< by the scene; otherwise the frame is that of the rod as drawn
 
   bool holdsPosition() const { return kind != Kind::fix_twist; }
