@@ -32,6 +32,12 @@ std::string exactly(double value) {
 
 } // namespace
 
+double lengthOf(const Rod &rod) {
+  double length = 0;
+  for (int i = 0; i < rod.edges(); ++i) length += rod.edge(i).norm();
+  return length;
+}
+
 Answer answerOf(const Simulation &run, std::vector<double> critical) {
   return {true, "", run.state.time, run.state.position, energyBudget(run.scene, *run.elements, run.state, run.state.time), std::move(critical)};
 }
@@ -109,7 +115,7 @@ Estimate richardson(const Scene &scene, const Answer &coarse, const Answer &fine
   for (const Rod &rod : scene.rods) {
     RodEstimate &r = out.rods.emplace_back();
     out.tan = out.tan || rod.measure == Measure::tan;
-    for (int i = 0; i < rod.edges(); ++i) r.length += rod.edge(i).norm();
+    r.length = lengthOf(rod);
     for (int v = 0; v < rod.vertices(); ++v) {
       const Vec3 &a = coarse.position[first + v], &b = fine.position[fine_first + 2 * v];
       const double error = (b - a).norm() * 4 / 3;

@@ -31,7 +31,7 @@ const std::vector<Entry> &entries() {
     std::vector<Entry> l{
         {"scene", "scene file (YAML)", "(required)"},
         {"mode", "dynamic: steps in time; static: steps in load to an equilibrium", "(from the scene) dynamic"},
-        {"dt", "time step [s]", "(from the scene) 0.01"},
+        {"dt", "time step [s]; chosen where -accuracy is given", "(from the scene) 0.01"},
         {"integrator", integratorMeanings(), "euler"},
         {"rho_inf", "generalized_alpha: what is left of the highest frequencies after a step, 0 to 1", "0.8"},
         {"dt_adapt", "none: steps of -dt; error: as long as the estimated error of a step allows, beginning with -dt (dynamic)", "none"},
@@ -51,8 +51,8 @@ const std::vector<Entry> &entries() {
         {"restart", "checkpoint of the same scene to go on from, to the same bits; the results go to another folder", "(none)"},
         {"output_fields", "fields of a frame besides the position: all for " + joined(TrajectoryWriter::fieldNames()) + "; by name also " + joined(TrajectoryWriter::derivedFieldNames()), "all"},
         {"error_estimate", "solve statics again with half the edge length and tell the estimated error; in dynamics tell that in time, where the integrator leaves it", "false"},
-        {"accuracy", "largest relative error: chooses the edges of every rod so that the estimate is below (static)", "(edges from the scene)"},
-        {"accuracy_of", "whose error: position (the largest, over the rod's length), tip (over the rod's length), or energy (elastic)", "position"},
+        {"accuracy", "largest relative error: chooses the edges of every rod, and in dynamics -dt (or -dt_rtol and -dt_atol), so that the estimate is below", "(edges from the scene)"},
+        {"accuracy_of", "whose error: position (the largest, over the rod's length), tip (over the rod's length), or energy (elastic); in dynamics root mean square in time", "position"},
         {"retraction", "how positions move: additive (straight), or length (keeping the linearised lengths of the edges)", "length"},
         {"stretch", "axial force: primal (from the strain), or mixed (an unknown of its own)", "mixed"},
         {"hessian", "exact, or gauss_newton (without second derivatives of the strains; for comparison)", "exact"},
@@ -241,8 +241,6 @@ namespace {
 /// Of estimates and the choice of edges.
 void checkAccuracy(const Options &o) {
   if (o.accuracy_of && !o.accuracy) fail("accuracy_of", "needs -accuracy, e.g. -accuracy 1e-3");
-  if (o.loop.dynamic && o.accuracy)
-    fail("accuracy", "chooses edges in -mode static only; in dynamics the step counts as well: compare with a run of half the -dt and twice the edges");
   if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength && (o.accuracy || o.error_estimate))
     fail(o.accuracy ? "accuracy" : "error_estimate", "needs -continuation load: paths of two resolutions have no states in common");
   if (o.accuracy && o.loop.bifurcation == Bifurcation::stop) fail("accuracy", "is that of the answer at full load; -bifurcation stop ends before");

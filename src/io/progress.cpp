@@ -17,8 +17,12 @@ void Progress::say(const std::string &line) {
   if (open_line_) std::printf("\n");
   open_line_ = false;
   std::printf("%s\n", line.c_str());
-  std::fprintf(log_, "%s\n", line.c_str());
   std::fflush(stdout);
+  log(line);
+}
+
+void Progress::log(const std::string &line) {
+  std::fprintf(log_, "%s\n", line.c_str());
   std::fflush(log_);
 }
 

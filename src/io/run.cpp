@@ -23,14 +23,16 @@ constexpr const char *usage =
     "  tendril -scene data/scenes/helix.yaml -dt 5e-3 -t_end 2 -output_dir out/helix\n"
     "Options of tendril are listed below; -snes_*, -ksp_*, -pc_*, -mat_* and -log_view are PETSc's (add -scene to list them with -help).\n";
 
-void makeFolder(const std::string &folder) {
+/// Whether there was none.
+bool makeFolder(const std::string &folder) {
   std::error_code error;
-  std::filesystem::create_directories(folder, error);
+  const bool made = std::filesystem::create_directories(folder, error);
   const std::string probe = folder + "/.probe";
   std::ofstream file(probe);
   if (error || !file) throw SceneError("option -output_dir: '" + folder + "' cannot be written; choose another folder");
   file.close();
   std::filesystem::remove(probe, error);
+  return made;
 }
 
 std::string groupsText(const Scene &scene) {
@@ -142,6 +144,19 @@ PetscErrorCode setUp(Prepared &prepared, Options &o) {
   PetscFunctionReturn(0);
 }
 
+/// Chooses the edges, and in dynamics the steps, and makes the scene ready to run with them.
+PetscErrorCode meetAccuracy(Prepared &prepared, Options &o, Choice *choice) {
+  PetscFunctionBeginUser;
+  choice->tell = [](const std::string &line) {
+    std::printf("%s\n", line.c_str());
+    std::fflush(stdout);
+  };
+  PetscCall(chooseResolution(prepared.written, prepared.drawings, o.loop, *o.accuracy, choice));
+  o.loop = choice->loop;
+  PetscCall(makeReady(redraw(prepared.written, prepared.drawings, choice->edges), o, prepared.run));
+  PetscFunctionReturn(0);
+}
+
 /// The error of a static answer, told and written.
 PetscErrorCode tellError(const Prepared &prepared, const std::vector<double> &critical, const Options &o, Progress &progress) {
   PetscFunctionBeginUser;
@@ -183,11 +198,14 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
   }
   if (o.help) PetscFunctionReturn(0);
   PetscCall(refuseUnknownOptions());
-  makeFolder(o.output_dir);
+  const bool made_folder = makeFolder(o.output_dir);
   Choice choice;
-  if (o.accuracy) {
-    PetscCall(chooseEdges(prepared.written, prepared.drawings, o.loop, *o.accuracy, &choice));
-    PetscCall(makeReady(redraw(prepared.written, prepared.drawings, choice.edges), o, prepared.run));
+  try {
+    if (o.accuracy) PetscCall(meetAccuracy(prepared, o, &choice));
+  } catch (const SceneError &) { // nothing was written yet
+    std::error_code error;
+    if (made_folder) std::filesystem::remove(o.output_dir, error);
+    throw;
   }
   Simulation &run = *prepared.run;
   TimeLoop loop(run.solver, o.loop);
@@ -206,8 +224,7 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
   progress.say(origin.command_line);
   std::istringstream groups(groupsText(run.scene));
   for (std::string line; std::getline(groups, line);) progress.say(line);
-
-  for (const std::string &line : choice.lines) progress.say(line);
+  for (const std::string &line : choice.lines) progress.log(line);
 
   auto writer = std::make_unique<TrajectoryWriter>(o.output_dir, run.scene, *run.elements, origin, o.fields, o.loop.dynamic);
   TrajectoryWriter &trajectory = *writer;

@@ -10,6 +10,9 @@
 
 namespace tendril {
 
+/// As drawn [m].
+double lengthOf(const Rod &rod);
+
 /// What an estimate compares.
 struct Answer {
   bool found = false;

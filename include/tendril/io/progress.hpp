@@ -15,6 +15,8 @@ public:
   void step(const Diagnostics &row);
   /// A line on the output and in the log.
   void say(const std::string &line);
+  /// In the log only.
+  void log(const std::string &line);
 
 private:
   double end_;

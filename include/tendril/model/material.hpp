@@ -18,6 +18,7 @@ struct Material {
 
   /// A cable: bending and twist cost nothing and the rod carries no twist unknowns.
   bool isCable() const { return flexural_stiffness[0] == 0 && flexural_stiffness[1] == 0; }
+  bool operator==(const Material &) const = default;
 };
 
 /// Shape of a homogeneous section. `size` is (radius, -), (semi-axis along the first director, along the second), or (width along the

@@ -48,11 +48,13 @@ struct Motion {
     double time;       ///< [s]
     Vec3 displacement; ///< [m]
     Vec3 rotation;     ///< rotation vector about the vertex [rad]
+    bool operator==(const Key &) const = default;
   };
   Vec3 velocity = Vec3::Zero();         ///< [m/s]
   Vec3 angular_velocity = Vec3::Zero(); ///< about the vertex [rad/s]
   std::vector<Key> table;               ///< in order of time; used instead of the velocities when not empty
 
+  bool operator==(const Motion &) const = default;
   bool moves() const { return !table.empty() || !velocity.isZero(0) || !angular_velocity.isZero(0); }
   Vec3 displacementAt(double time) const;
   Vec3 velocityAt(double time) const;       ///< where it jumps, that before [m/s]

@@ -1,0 +1,15 @@
+#pragma once
+/// \file alike.hpp
+/// Rods that do the same, as copies do: what is found out for one of them holds for all.
+
+#include "tendril/model/redraw.hpp"
+
+namespace tendril {
+
+/// For each rod the first one of which it is a shifted copy: with the same shape, material, supports and loads. In a frame that turns, its own number.
+std::vector<int> firstAlike(const Scene &scene, const std::vector<Drawing> &drawings);
+
+/// The scene with some of its rods only, and what holds and pulls them. \param rods increasing
+Scene withRods(const Scene &scene, const std::vector<int> &rods);
+
+} // namespace tendril
