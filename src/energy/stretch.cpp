@@ -70,15 +70,22 @@ AxialLaw::AxialLaw(const Scene &scene, const Elements &elements) : scene_(scene)
   std::copy_n(elements.axialStiffness(), elements.slots, planes_[0]);
 }
 
-/// Dissipation as in the bending term: a second quadratic around the strain at the start (dampedRest).
+/// Dissipation as in the bending term: a second quadratic around the strain at the start (dampedRest). The mean of the strains at the ends of a step is
+/// that in its middle and |de|^2/(2 L^2), de by what the edge moves on either side: known from a solve before, it is a rest strain.
 void AxialLaw::beginStep(const Configuration &start, const Step &step, int r) {
   const double beta = scene_.rods[r].material.stiffness_damping_coefficient;
-  if (beta == 0) return;
+  const Rates *half = step.rule ? step.rule->half : nullptr;
+  moved_ = moved_ || half;
+  if (beta == 0 && !moved_) return;
   const double q = step.isStatic() ? 0 : beta / step.dampingDt();
   const RodRange &rod = elements_.rods[r];
-  for (int i = rod.first_slot; i < rod.edgeEnd(); ++i) {
+  for (int k = 0; k < rod.edges; ++k) {
+    const int i = rod.slot(k), v = rod.first_vertex;
     planes_[0][i] = elements_.axialStiffness()[i] * (1 + q);
     planes_[1][i] = q / (1 + q) * dampedRest(step, start[Configuration::strain][i], i);
+    if (half)
+      planes_[1][i] -=
+          0.5 / (1 + q) * (half->vertex[v + (k + 1) % rod.vertices] - half->vertex[v + k]).squaredNorm() * std::pow(elements_.inverseRestLength()[i], 2);
   }
 }
 

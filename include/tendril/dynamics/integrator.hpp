@@ -51,5 +51,6 @@ std::unique_ptr<Integrator> makeBdf2(const IntegratorSettings &);
 std::unique_ptr<Integrator> makeSdirk2(const IntegratorSettings &);
 std::unique_ptr<Integrator> makeMidpoint(const IntegratorSettings &);
 std::unique_ptr<Integrator> makeGeneralizedAlpha(const IntegratorSettings &);
+std::unique_ptr<Integrator> makeEnergyMomentum(const IntegratorSettings &);
 
 } // namespace tendril

@@ -48,7 +48,8 @@ struct StageRule {
   double damping_dt = 0;              ///< [s]
   double damping_memory = 0;
   const std::vector<double> *strains = nullptr;
-  Combination guess; ///< of d, to start Newton from [m]
+  Combination guess;           ///< of d, to start Newton from [m]
+  const Rates *half = nullptr; ///< displacements to the middle of the step: axial forces come from the mean of the strains at both its ends (AxialLaw)
 };
 
 /// Frames of a rod from which a stage measures twist: those of the start, carried to where the guess leads. Twist inertia then acts on positions by

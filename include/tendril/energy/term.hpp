@@ -72,6 +72,7 @@ private:
   const Scene &scene_;
   const Elements &elements_;
   Planes planes_;
+  bool moved_ = false; ///< some step had rest strains of its own
 };
 
 /// The terms that the scene needs, in a fixed order; stretch is the first.

@@ -16,6 +16,7 @@ constexpr Entry entries[] = {
     {"sdirk2", "second order, L-stable, two solves a step, first order on stiff rods", makeSdirk2},
     {"midpoint", "second order, keeps the energy within a band, damps nothing", makeMidpoint},
     {"generalized_alpha", "second order, damps high frequencies by -rho_inf", makeGeneralizedAlpha},
+    {"energy_momentum", "midpoint that keeps the energy of stiff rods, too, two solves a step", makeEnergyMomentum},
 };
 
 } // namespace
