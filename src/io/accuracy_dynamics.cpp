@@ -174,6 +174,7 @@ private:
       s.output_interval = landing_;
     } else {
       s.dt = s.t_end / steps;
+      s.output_interval = 0; // samples are taken between steps
       if (s.dt_min > s.dt) s.dt_min = 0;
     }
     return s;
