@@ -172,7 +172,7 @@ void tellTimeError(const Diagnostics &last, const Options &o, Progress &progress
   const std::optional<double> error = accumulatedTimeError(last);
   if (!error) return progress.say("no estimate: the diagnostics have no column error_estimate, in which an integrator leaves its error in time");
   std::ostringstream line;
-  line << "estimated error: " << std::setprecision(3) << *error << " in time, the local errors of all steps added up; that of the edges is not in it";
+  line << "estimated error: " << std::setprecision(3) << *error << " rod lengths in time, the local errors of all steps added up; that of the edges is not in it";
   progress.say(line.str());
   writeTimeError(o.output_dir + "/trajectory.h5", *error);
 }
