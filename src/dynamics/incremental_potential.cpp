@@ -227,13 +227,13 @@ void IncrementalPotential::assembleRod(int r, HessianKind hessian) {
   Derivatives &d = derivatives_;
   for (int a = 0; a < slot_size; ++a)
     for (Planes *p : {&d.gradient, &d.equilibrium}) std::fill((*p)[a] + rod.first_slot - 1, (*p)[a] + rod.first_slot + rod.slots - 1, 0.0);
-  if (hessian != HessianKind::none) d.band.clear(rod);
+  if (hessian != HessianKind::none) d.blocks.clear(rod);
   for (const auto &term : terms_) term->addDerivatives(iterate_, r, d, hessian);
   for (int a = 0; a < slot_size; ++a)
     for (int s = rod.first_slot; s < rod.vertexEnd() + 2; s += lanes) addTo(d.gradient[a] + s, read<Pack>(d.equilibrium[a] + s));
   dofs_.fold(rod, d.gradient);
   dofs_.fold(rod, d.equilibrium);
-  if (hessian != HessianKind::none) dofs_.fold(rod, d.band);
+  if (hessian != HessianKind::none) d.blocks.fold(rod);
   known_[r] = hessian == HessianKind::none ? Known::gradient : Known::all;
 }
 

@@ -18,7 +18,9 @@ public:
       const std::array<T, 3> s = presentStrain<T>(elements_, start, r, cell, count);
       for (int k = 0; k < 3; ++k) {
         write(cells_[cell_stiffness + k] + cell.slot, T(read<T>(elements_.cells()[cell_stiffness + k] + cell.slot) * T(1 + q)));
-        write(cells_[cell_rest + k] + cell.slot, T((read<T>(elements_.cells()[cell_rest + k] + cell.slot) + T(q) * dampedRest(step, s[k], (k + 1) * strainRow(elements_) + cell.slot)) / T(1 + q)));
+        write(
+            cells_[cell_rest + k] + cell.slot,
+            T((read<T>(elements_.cells()[cell_rest + k] + cell.slot) + T(q) * dampedRest(step, s[k], (k + 1) * strainRow(elements_) + cell.slot)) / T(1 + q)));
       }
     });
   }
@@ -28,7 +30,8 @@ public:
   }
 
   void addDerivatives(const Configuration &configuration, int rod, Derivatives &out, HessianKind hessian) const override {
-    elements_.measure[rod] == Measure::tan ? assemble<Measure::tan>(configuration, rod, hessian, out) : assemble<Measure::angle>(configuration, rod, hessian, out);
+    elements_.measure[rod] == Measure::tan ? assemble<Measure::tan>(configuration, rod, hessian, out)
+                                           : assemble<Measure::angle>(configuration, rod, hessian, out);
   }
 
 private:
@@ -50,13 +53,20 @@ private:
     return energy + reduce(energies);
   }
 
-  /// Where the derivatives of a cell go: the planes of its unknowns, from its first slot on.
+  /// Where the derivatives of a cell go: the planes of its vertices' gradient and of its edges' blocks, from its first edge's slot on.
   template <class T> struct Adder {
     const std::array<double *, slot_size> &gradient;
-    const std::array<double *, slot_entries> &entry;
+    const BlockPlanes &blocks;
     int first;
     void putGradient(int r, const T &v) const { addTo(gradient[r % slot_size] + first + r / slot_size, v); }
-    void putHessian(int r, int c, const T &v) const { addTo(entry[r % slot_size * band_width + c - r] + first + r / slot_size, v); }
+    void putHessian(int r, int c, const T &v) const {
+      if (c < edge_size)
+        addTo(blocks.own(r, c) + first, v);
+      else if (r < edge_size)
+        addTo(blocks.across(r, c - edge_size) + first + 1, v);
+      else
+        addTo(blocks.own(r - edge_size, c - edge_size) + first + 1, v);
+    }
   };
   /// The Hessian alone.
   template <class T> struct HessianAdder : Adder<T> {
@@ -64,21 +74,20 @@ private:
   };
 
   template <Measure measure> void assemble(const Configuration &configuration, int rod, HessianKind hessian, Derivatives &out) const {
-    const RodRange &range = elements_.rods[rod];
     std::array<double *, slot_size> gradient;
-    std::array<double *, slot_entries> entry;
     for (int a = 0; a < slot_size; ++a) gradient[a] = out.equilibrium[a];
-    for (int e = 0; e < slot_entries; ++e) entry[e] = out.band.entry(range, e / band_width, e % band_width) - range.first_slot;
+    const BlockPlanes blocks(out.blocks, elements_.rods[rod]);
     if (hessian == HessianKind::none)
       addGradients<measure>(configuration, rod, gradient);
     else if (hessian == HessianKind::gauss_newton) {
       addGradients<measure>(configuration, rod, gradient);
-      addGaussNewton<measure>(configuration, rod, gradient, entry);
+      addGaussNewton<measure>(configuration, rod, gradient, blocks);
     } else
-      addAll<measure>(configuration, rod, gradient, entry);
+      addAll<measure>(configuration, rod, gradient, blocks);
   }
 
-  template <Measure measure> [[gnu::flatten, gnu::noinline]] void addGradients(const Configuration &c, int rod, const std::array<double *, slot_size> &gradient) const {
+  template <Measure measure>
+  [[gnu::flatten, gnu::noinline]] void addGradients(const Configuration &c, int rod, const std::array<double *, slot_size> &gradient) const {
     forCells(elements_, rod, [&]<class T>(const LooseCell &cell, int count) {
       const auto f = cellFrames<T>(c, cell, count);
       const std::array<T, cell_size> g = cellGradient<measure>(f[0], f[1], cellOf<T>(cells_, c, cell.slot));
@@ -87,21 +96,23 @@ private:
   }
 
   template <Measure measure>
-  [[gnu::flatten, gnu::noinline]] void addAll(const Configuration &c, int rod, const std::array<double *, slot_size> &gradient, const std::array<double *, slot_entries> &entry) const {
+  [[gnu::flatten, gnu::noinline]] void addAll(const Configuration &c, int rod, const std::array<double *, slot_size> &gradient,
+                                              const BlockPlanes &blocks) const {
     forCells(elements_, rod, [&]<class T>(const LooseCell &cell, int count) {
       const auto f = cellFrames<T>(c, cell, count);
-      cellDerivatives<measure>(f[0], f[1], cellOf<T>(cells_, c, cell.slot), Adder<T>{gradient, entry, cell.vertex - 1});
+      cellDerivatives<measure>(f[0], f[1], cellOf<T>(cells_, c, cell.slot), Adder<T>{gradient, blocks, cell.vertex - 1});
     });
   }
 
   /// The Hessian that cells would have if they were at rest as they are.
   template <Measure measure>
-  [[gnu::flatten, gnu::noinline]] void addGaussNewton(const Configuration &c, int rod, const std::array<double *, slot_size> &gradient, const std::array<double *, slot_entries> &entry) const {
+  [[gnu::flatten, gnu::noinline]] void addGaussNewton(const Configuration &c, int rod, const std::array<double *, slot_size> &gradient,
+                                                      const BlockPlanes &blocks) const {
     forCells(elements_, rod, [&]<class T>(const LooseCell &cell, int count) {
       const auto f = cellFrames<T>(c, cell, count);
       CellOf<T> constants = cellOf<T>(cells_, c, cell.slot);
       constants.rest = cellStrain<measure>(f[0], f[1], constants);
-      cellDerivatives<measure>(f[0], f[1], constants, HessianAdder<T>{{gradient, entry, cell.vertex - 1}});
+      cellDerivatives<measure>(f[0], f[1], constants, HessianAdder<T>{{gradient, blocks, cell.vertex - 1}});
     });
   }
 };

@@ -7,7 +7,8 @@ namespace {
 
 class Inertia final : public Term {
 public:
-  Inertia(const Scene &scene, const Elements &elements) : scene_(scene), elements_(elements), predicted_(slot_size, elements.slots), weight_(scene.rods.size()) {}
+  Inertia(const Scene &scene, const Elements &elements)
+      : scene_(scene), elements_(elements), predicted_(slot_size, elements.slots), weight_(scene.rods.size()) {}
 
   /// With v = d/dt + u and acceleration (mass v + b)/dt (StageRule), inertia and dissipation are m (mass/dt^2 + alpha/dt) (d - d_hat),
   /// d_hat = -dt u - b dt/(mass + alpha dt); the same for the twist increment. Backward Euler has mass 1, u = 0 and b = -v_n.
@@ -49,13 +50,12 @@ public:
 
   [[gnu::flatten]] void addDerivatives(const Configuration &c, int r, Derivatives &out, HessianKind hessian) const override {
     const RodRange &rod = elements_.rods[r];
-    std::array<double *, slot_entries> entry;
-    for (int e = 0; e < slot_entries; ++e) entry[e] = out.band.entry(rod, e / band_width, e % band_width) - rod.first_slot;
+    const BlockPlanes blocks(out.blocks, rod);
     for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) {
       const Pack w = read<Pack>(elements_.mass() + s) * Pack(weight_[r]);
       for (int a = 0; a < 3; ++a) {
         addTo<Pack>(out.equilibrium[a] + s, w * (read<Pack>(c[Configuration::Plane(Configuration::position + a)] + s) - read<Pack>(predicted_[a] + s)));
-        if (hessian != HessianKind::none) addTo(entry[a * band_width] + s, w);
+        if (hessian != HessianKind::none) addTo(blocks.vertex(a, a) + s, w);
       }
     }
     if (!rod.twist) return;
@@ -66,22 +66,8 @@ public:
       addTo(out.equilibrium[3] + s, d.gradient[3]);
       for (int a = 0; a < 3; ++a) addTo<Pack>(out.equilibrium[a] + s, -d.gradient[a]);
       if (hessian != HessianKind::none) {
-        auto couple = [&](int a, int k, const Pack &v) { addTo(entry[a * band_width + k] + s, v); };
-        couple(3, 0, d.hessian[9]);
-        int k = 0;
-        for (int a = 0; a < 3; ++a) {
-          for (int b = a; b < 3; ++b, ++k) {
-            couple(a, b - a, d.hessian[k]);
-            couple(a, slot_size + b - a, -d.hessian[k]);
-            if (b != a) couple(b, slot_size + a - b, -d.hessian[k]);
-          }
-          couple(a, 3 - a, -d.hessian[k]);
-          couple(3, 1 + a, d.hessian[k]);
-          ++k;
-        }
-        k = 0;
-        for (int a = 0; a < 3; ++a, ++k)
-          for (int b = a; b < 3; ++b, ++k) addTo(entry[a * band_width + b - a] + s + 1, d.hessian[k]);
+        for (int a = 0, k = 0; a < edge_size; ++a)
+          for (int b = a; b < edge_size; ++b, ++k) addTo(blocks.own(a, b) + s, d.hessian[k]);
       }
       for (int a = 0; a < 3; ++a) addTo(out.equilibrium[a] + s + 1, d.gradient[a]);
     }
@@ -91,7 +77,7 @@ private:
   const Scene &scene_;
   const Elements &elements_;
   const Configuration *start_ = nullptr; ///< twist is measured from its frames
-  Planes predicted_; ///< positions, and twists since the start
+  Planes predicted_;                     ///< positions, and twists since the start
   std::vector<double> weight_;
 };
 

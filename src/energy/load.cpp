@@ -8,7 +8,9 @@ namespace {
 /// no potential over large rotations, so it is measured from the last iterate: all that a line search compares starts there.
 class Load final : public Term {
 public:
-  Load(const Scene &scene, const Elements &elements) : elements_(elements), turns_(!scene.rotation.angular_velocity.isZero(0)), centre_(scene.rotation.centre), spin_(scene.rotation.matrix()), full_(3, elements.slots), couples_(scene.rods.size()) {
+  Load(const Scene &scene, const Elements &elements)
+      : elements_(elements), turns_(!scene.rotation.angular_velocity.isZero(0)), centre_(scene.rotation.centre), spin_(scene.rotation.matrix()),
+        full_(3, elements.slots), couples_(scene.rods.size()) {
     for (std::size_t r = 0; r < scene.rods.size(); ++r)
       if (scene.rods[r].gravity)
         for (int s = elements.rods[r].first_slot; s < elements.rods[r].vertexEnd(); ++s) full_.setVector(0, s, elements.mass()[s] * scene.gravity);
@@ -48,7 +50,8 @@ public:
       Pack centrifugal(0.0);
       for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) {
         const Vector3<Pack> x = c.positions<Pack>(s), a = accelerationAt(x);
-        centrifugal += read<Pack>(elements_.mass() + s) * ((x[0] - Pack(centre_[0])) * a[0] + (x[1] - Pack(centre_[1])) * a[1] + (x[2] - Pack(centre_[2])) * a[2]);
+        centrifugal +=
+            read<Pack>(elements_.mass() + s) * ((x[0] - Pack(centre_[0])) * a[0] + (x[1] - Pack(centre_[1])) * a[1] + (x[2] - Pack(centre_[2])) * a[2]);
       }
       sum -= 0.5 * factor_ * reduce(centrifugal);
     }
@@ -63,6 +66,7 @@ public:
 
   void addDerivatives(const Configuration &c, int r, Derivatives &out, HessianKind hessian) const override {
     const RodRange &rod = elements_.rods[r];
+    const BlockPlanes blocks(out.blocks, rod);
     for (int a = 0; a < 3; ++a)
       for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) addTo<Pack>(out.equilibrium[a] + s, -read<Pack>(force_[a] + s));
     if (turns_)
@@ -71,7 +75,7 @@ public:
         const Vector3<Pack> a = accelerationAt(c.positions<Pack>(s));
         for (int k = 0; k < 3; ++k) {
           addTo<Pack>(out.equilibrium[k] + s, -weight * a[k]);
-          for (int l = k; l < 3 && hessian != HessianKind::none; ++l) addTo<Pack>(out.band.entry(rod, k, l - k) + (s - rod.first_slot), -weight * Pack(spin_(k, l)));
+          for (int l = k; l < 3 && hessian != HessianKind::none; ++l) addTo<Pack>(blocks.vertex(k, l) + s, -weight * Pack(spin_(k, l)));
         }
       }
     for (const Couple &m : couples_[r]) {
@@ -82,7 +86,7 @@ public:
         out.equilibrium[a][m.slot] += pair[a];
         out.equilibrium[a][m.slot + 1] -= pair[a];
       }
-      if (hessian != HessianKind::none) addCoupleHessian(factor_ * m.moment, f, rod, m.slot - rod.first_slot, out.band);
+      if (hessian != HessianKind::none) addCoupleHessian(factor_ * m.moment, f, m.slot, blocks);
     }
   }
 
@@ -95,7 +99,7 @@ private:
   const Elements &elements_;
   bool turns_;
   Vec3 centre_;
-  Mat3 spin_; ///< see Scene::Rotation::matrix
+  Mat3 spin_;           ///< see Scene::Rotation::matrix
   Planes full_, force_; ///< forces on vertices [N] at load factor 1, and now
   std::vector<std::vector<Couple>> couples_;
   const Configuration *start_ = nullptr;
@@ -104,27 +108,21 @@ private:
   /// Centrifugal acceleration.
   Vector3<Pack> accelerationAt(const Vector3<Pack> &x) const {
     Vector3<Pack> a;
-    for (int k = 0; k < 3; ++k) a[k] = Pack(spin_(k, 0)) * (x[0] - Pack(centre_[0])) + Pack(spin_(k, 1)) * (x[1] - Pack(centre_[1])) + Pack(spin_(k, 2)) * (x[2] - Pack(centre_[2]));
+    for (int k = 0; k < 3; ++k)
+      a[k] = Pack(spin_(k, 0)) * (x[0] - Pack(centre_[0])) + Pack(spin_(k, 1)) * (x[1] - Pack(centre_[1])) + Pack(spin_(k, 2)) * (x[2] - Pack(centre_[2]));
     return a;
   }
 
   /// Symmetric part of the derivative of the gradient of a couple over (e, theta): with g_e = -(M x t)/l and g_theta = -M.t,
   /// d g_e/d e = -[M]x (I - 2 t t')/l^2 ... symmetrised, d g_theta/d e = -(I - t t') M/l and d g_e/d theta = 0.
-  static void addCoupleHessian(const Vec3 &moment, const Frame &f, const RodRange &rod, int i, Band &band) {
+  static void addCoupleHessian(const Vec3 &moment, const Frame &f, int slot, const BlockPlanes &blocks) {
     const Vec3 &t = f.tangent;
     const double inverse = 1 / f.length;
     const Vec3 cross = moment.cross(t), off = (moment - t * moment.dot(t)) * (-0.5 * inverse);
     const Mat3 h = (cross * t.transpose() + t * cross.transpose()) * (inverse * inverse);
     for (int a = 0; a < 3; ++a) {
-      band.entry(rod, a, 3 - a)[i] -= off[a];
-      band.entry(rod, 3, 1 + a)[i] += off[a];
-      for (int b = 0; b < 3; ++b) {
-        if (b >= a) {
-          band.entry(rod, a, b - a)[i] += h(a, b);
-          band.entry(rod, a, b - a)[i + 1] += h(a, b);
-        }
-        band.entry(rod, a, slot_size + b - a)[i] -= h(a, b);
-      }
+      blocks.own(a, 3)[slot] += off[a];
+      for (int b = a; b < 3; ++b) blocks.own(a, b)[slot] += h(a, b);
     }
   }
 };

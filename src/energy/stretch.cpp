@@ -23,9 +23,7 @@ public:
 
   [[gnu::flatten]] void addDerivatives(const Configuration &configuration, int r, Derivatives &out, HessianKind hessian) const override {
     const RodRange &rod = elements_.rods[r];
-    double *entry[3][band_width];
-    for (int a = 0; a < 3; ++a)
-      for (int k = 0; k < band_width; ++k) entry[a][k] = out.band.entry(rod, a, k) - rod.first_slot;
+    const BlockPlanes blocks(out.blocks, rod);
     for (int i = rod.first_slot; i < rod.edgeEnd(); i += lanes) {
       const Pack::mask_type live = firstLanes(rod.edgeEnd() - i); // the copies behind a ring have forces, too
       const Pack stiffness = read<Pack>(law_.stiffness() + i), inverse = read<Pack>(elements_.inverseRestLength() + i);
@@ -33,27 +31,19 @@ public:
       const Pack force = select(live, mixed_ ? read<Pack>(configuration[Configuration::axial_force] + i) : primal, Pack(0.0));
       const FrameOf<Pack> f = configuration.frames<Pack>(i);
       const Vector3<Pack> e = stretchGradient(f, force, inverse), g = stretchGradient<Pack>(f, select(live, primal - force, Pack(0.0)), inverse);
-      // What belongs to the first vertex of the edges before what belongs to the second, whose memory overlaps (see cellDerivatives).
+      // What belongs to the first vertex of the edges before what belongs to the second, whose memory overlaps: the store has left the pipeline by then.
       for (int a = 0; a < 3; ++a) {
         addTo<Pack>(out.equilibrium[a] + i, -e[a]);
         addTo<Pack>(out.gradient[a] + i, -g[a]);
       }
-      if (hessian == HessianKind::none) {
-        for (int a = 0; a < 3; ++a) {
-          addTo(out.equilibrium[a] + i + 1, e[a]);
-          addTo(out.gradient[a] + i + 1, g[a]);
-        }
-        continue;
-      }
-      const Matrix3<Pack> h = stretchHessian<Pack>(f, stiffness, hessian == HessianKind::exact ? force : max(force, Pack(0.0)), inverse);
-      for (int a = 0; a < 3; ++a) {
-        for (int b = a; b < 3; ++b) addTo(entry[a][b - a] + i, h(a, b));
-        for (int b = 0; b < 3; ++b) addTo<Pack>(entry[a][slot_size + b - a] + i, -h(a, b));
+      if (hessian != HessianKind::none) {
+        const Matrix3<Pack> h = stretchHessian<Pack>(f, stiffness, hessian == HessianKind::exact ? force : max(force, Pack(0.0)), inverse);
+        for (int a = 0; a < 3; ++a)
+          for (int b = a; b < 3; ++b) addTo(blocks.own(a, b) + i, h(a, b));
       }
       for (int a = 0; a < 3; ++a) {
         addTo(out.equilibrium[a] + i + 1, e[a]);
         addTo(out.gradient[a] + i + 1, g[a]);
-        for (int b = a; b < 3; ++b) addTo(entry[a][b - a] + i + 1, h(a, b));
       }
     }
   }

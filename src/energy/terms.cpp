@@ -14,7 +14,8 @@ std::vector<std::unique_ptr<Term>> makeTerms(const Scene &scene, const Elements 
   return terms;
 }
 
-[[gnu::flatten]] EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, const Configuration &c, double load_factor, int r) {
+[[gnu::flatten]] EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, const Configuration &c, double load_factor,
+                                           int r) {
   EnergyBudget budget;
   const RodRange &rod = elements.rods[r];
   double kinetic = 0, gravity = 0;
@@ -24,7 +25,8 @@ std::vector<std::unique_ptr<Term>> makeTerms(const Scene &scene, const Elements 
     kinetic += mass * state.velocity[v].squaredNorm();
     gravity += mass * scene.gravity.dot(state.position[v]);
   }
-  for (int i = 0; i < rod.edges; ++i) kinetic += elements.twistMass()[rod.slot(i)] * state.twist_rate[rod.first_edge + i] * state.twist_rate[rod.first_edge + i];
+  for (int i = 0; i < rod.edges; ++i)
+    kinetic += elements.twistMass()[rod.slot(i)] * state.twist_rate[rod.first_edge + i] * state.twist_rate[rod.first_edge + i];
   budget.kinetic = 0.5 * kinetic;
   budget.gravity = scene.rods[r].gravity ? -load_factor * gravity : 0;
   if (!scene.rotation.angular_velocity.isZero(0))

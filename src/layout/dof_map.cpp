@@ -127,11 +127,11 @@ PetscErrorCode DofMap::setUp(const Scene &scene) {
 
 namespace {
 
-/// Slot and unknown `k` after unknown `a` of a slot; those behind a ring are its first.
-std::array<int, 2> neighbour(const RodRange &rod, int i, int a, int k) {
-  const int j = i + (a + k) / slot_size;
-  return {rod.slot(rod.closed && j >= rod.vertices ? j - rod.vertices : j), (a + k) % slot_size};
-}
+/// An unknown that an edge variable is made of, or the position of a vertex: e_i = x_{i+1} - x_i.
+struct Part {
+  PetscInt unknown;
+  bool minus;
+};
 
 } // namespace
 
@@ -139,27 +139,42 @@ PetscErrorCode DofMap::createMatrix(Mat *matrix) {
   PetscFunctionBeginUser;
   std::vector<PetscInt> row, column;
   source_.clear();
-  Band band; // its window is that of all rods, which begins with the first
-  band.setOrigin(rods_.front().first_slot);
-  for (const RodRange &rod : rods_)
-    for (int i = 0; i < rod.vertices; ++i)
-      for (int a = 0; a < slot_size; ++a)
-        for (int k = 0; k < band_width; ++k) {
-          if (!rod.closed && i + (a + k) / slot_size >= rod.vertices) continue;
-          const auto [slot, b] = neighbour(rod, i, a, k);
-          const PetscInt u = unknown(rod.slot(i), a), v = unknown(slot, b);
-          if (u < 0 || v < 0) continue;
-          row.push_back(u);
-          column.push_back(v);
-          source_.push_back(band.offset(rod, a, k) + i);
+  EdgeBlocks blocks; // its window is that of all rods, which begins with the first
+  blocks.setOrigin(rods_.front().first_slot);
+  for (const RodRange &rod : rods_) {
+    auto slot = [&](int i) { return rod.slot(rod.closed ? i % rod.vertices : i); };
+    auto edge = [&](int i, int r) {
+      std::vector<Part> parts;
+      if (r == 3)
+        parts = {{unknown(slot(i), 3), false}};
+      else
+        parts = {{unknown(slot(i), r), true}, {unknown(slot(i + 1), r), false}};
+      return parts;
+    };
+    auto position = [&](int i, int r) { return std::vector<Part>{{unknown(slot(i), r), false}}; };
+    auto couple = [&](const std::vector<Part> &left, const std::vector<Part> &right, int plane, int i, bool once) {
+      const std::ptrdiff_t source = std::ptrdiff_t(blocks.offset(rod, plane)) + i;
+      for (const Part &a : left)
+        for (const Part &b : right) {
+          if (a.unknown < 0 || b.unknown < 0) continue;
+          for (const bool mirrored : {false, true}) {
+            if (mirrored && once) continue;
+            row.push_back(mirrored ? b.unknown : a.unknown);
+            column.push_back(mirrored ? a.unknown : b.unknown);
+            source_.push_back(a.minus == b.minus ? source : ~source);
+          }
         }
-  const std::size_t upper = source_.size();
-  for (std::size_t n = 0; n < upper; ++n)
-    if (row[n] != column[n]) {
-      row.push_back(column[n]);
-      column.push_back(row[n]);
-      source_.push_back(source_[n]);
-    }
+    };
+    for (int i = 0; i < rod.edges; ++i)
+      for (int r = 0; r < edge_size; ++r)
+        for (int c = r; c < edge_size; ++c) couple(edge(i, r), edge(i, c), EdgeBlocks::own(r, c), i, r == c);
+    for (int i = 1; i < rod.edges + (rod.closed ? 1 : 0); ++i)
+      for (int r = 0; r < edge_size; ++r)
+        for (int c = 0; c < edge_size; ++c) couple(edge(i - 1, r), edge(i, c), EdgeBlocks::across(r, c), i, false);
+    for (int i = 0; i < rod.vertices; ++i)
+      for (int r = 0; r < 3; ++r)
+        for (int c = r; c < 3; ++c) couple(position(i, r), position(i, c), EdgeBlocks::vertex(r, c), i, r == c);
+  }
   PetscCall(MatCreate(PETSC_COMM_WORLD, matrix));
   PetscCall(MatSetSizes(*matrix, unknowns_, unknowns_, PETSC_DETERMINE, PETSC_DETERMINE));
   PetscCall(MatSetType(*matrix, MATAIJ));
@@ -171,9 +186,9 @@ PetscErrorCode DofMap::createMatrix(Mat *matrix) {
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode DofMap::fillMatrix(const Band &band, Mat matrix) {
+PetscErrorCode DofMap::fillMatrix(const EdgeBlocks &blocks, Mat matrix) {
   PetscFunctionBeginUser;
-  for (std::size_t n = 0; n < source_.size(); ++n) entries_[n] = band.data()[source_[n]];
+  for (std::size_t n = 0; n < source_.size(); ++n) entries_[n] = source_[n] >= 0 ? blocks.data()[source_[n]] : -blocks.data()[~source_[n]];
   PetscCall(MatSetValuesCOO(matrix, entries_.data(), INSERT_VALUES));
   PetscFunctionReturn(0);
 }
@@ -191,18 +206,6 @@ void DofMap::fold(const RodRange &rod, Planes &sums) const {
     for (const int i : {0, 1}) {
       sums[a][rod.slot(i)] += sums[a][rod.slot(rod.vertices + i)];
       sums[a][rod.slot(rod.vertices + i)] = 0;
-    }
-}
-
-void DofMap::fold(const RodRange &rod, Band &band) const {
-  if (!rod.closed) return;
-  for (int a = 0; a < slot_size; ++a)
-    for (int k = 0; k < band_width; ++k) {
-      double *entry = band.entry(rod, a, k);
-      for (const int i : {0, 1}) {
-        entry[i] += entry[rod.vertices + i];
-        entry[rod.vertices + i] = 0;
-      }
     }
 }
 
@@ -240,24 +243,6 @@ PetscErrorCode DofMap::scatter(Vec in, RodSet rods, Planes &values) const {
   }
   PetscCall(VecRestoreArrayRead(in, &from));
   PetscFunctionReturn(0);
-}
-
-void Band::clear(const RodRange &rod) { std::fill_n(entry(rod, 0, 0) - 1, std::size_t(slot_entries) * rod.slots, 0.0); }
-
-void Band::subtractFrom(const Band &other) {
-  for (std::size_t k = 0; k < data_.size(); ++k) data_[k] = other.data_[k] - data_[k];
-}
-
-void Band::multiply(const RodRange &rod, const Planes &x, Planes &y) const {
-  for (int a = 0; a < slot_size; ++a)
-    for (int k = 0; k < band_width; ++k) {
-      const double *h = entry(rod, a, k);
-      const int away = (a + k) / slot_size, b = (a + k) % slot_size;
-      for (int i = 0; i < rod.vertices; ++i) {
-        y[a][rod.slot(i)] += h[i] * x[b][rod.slot(i + away)];
-        if (k > 0) y[b][rod.slot(i + away)] += h[i] * x[a][rod.slot(i)];
-      }
-    }
 }
 
 } // namespace tendril

@@ -5,163 +5,535 @@
 #include <algorithm>
 #include <limits>
 #include <numeric>
+#include <tuple>
 
 namespace tendril {
 namespace {
 
-constexpr int half_band = band_width - 1;
-/// Rows of a ring that meet its first: the unknowns of its last two slots.
-constexpr int border = 2 * slot_size;
-
-/// Numbers kept of a row: the inverse pivot, the couplings to the next ten, the diagonal before elimination. Padded for vector loads along a
-/// row where the lanes are not rods.
-template <class T> constexpr int width = sizeof(T) == sizeof(double) ? 16 : band_width + 1;
-constexpr int diagonal_place = band_width;
+/// Variables of what a rod beyond a vertex stores: the vertex' position and the vector and twist of the edge before it.
+constexpr int state_size = 7, edge_at = 3;
 
 template <class T> T *as(double *p) { return reinterpret_cast<T *>(p); }
+template <class T> const T *as(const double *p) { return reinterpret_cast<const T *>(p); }
 
-/// Pivot of a row with its sign counted. What rounding has left of a diagonal is no pivot.
-template <class T> T countedPivot(const T &d, const T &diagonal, T &negative, T &neutral) {
+/// Pivot of a row with its sign counted. What rounding has left of the numbers that were added to it, `scale`, is no pivot.
+template <class T> T countedPivot(const T &d, const T &scale, T &negative, T &neutral) {
   using std::abs;
-  const T scale = abs(diagonal);
   const auto lost = abs(d) <= T(16 * std::numeric_limits<double>::epsilon()) * scale;
   neutral += select(lost, T(1.0), T(0.0));
   negative += select(!lost && d < T(0.0), T(1.0), T(0.0));
   return select(lost, select(scale > T(0.0), T(1e-6) * scale, T(1.0)), d);
 }
 
-/// Eight couplings of one row.
+/// A row over the variables of the state: of one rod in a register, of a pack of rods as so many packs.
 typedef double Octet __attribute__((vector_size(64), aligned(8)));
-Octet &octet(double *p) { return *reinterpret_cast<Octet *>(p); }
+template <class T> struct Row;
+template <> struct Row<double> {
+  static constexpr int size = 8;
+  Octet v{};
+  static Row load(const double *p) { return {*reinterpret_cast<const Octet *>(p)}; }
+  void store(double *p) const { *reinterpret_cast<Octet *>(p) = v; }
+  double operator[](int c) const { return v[c]; }
+  void set(int c, double x) { v[c] = x; }
+  /// What comes before column `first` may be left out.
+  void subtract(double a, const Row &b, int /*first*/ = 0) { v -= a * b.v; }
+  static void symmetrise(Row *) {}
+  Row scaled(double a) const { return {a * v}; }
+  void add(const Row &b) { v += b.v; }
+  /// What belongs to the position is the edge's, too.
+  void addPositionToEdge() { v += __builtin_shufflevector(v, Octet{}, 8, 8, 8, 0, 1, 2, 8, 8); }
+  void dropPosition() { v = __builtin_shufflevector(v, Octet{}, 8, 8, 8, 3, 4, 5, 6, 8); }
+};
+template <> struct Row<Pack> {
+  static constexpr int size = state_size;
+  Pack v[state_size] = {};
+  static Row load(const Pack *p) {
+    Row r;
+    std::copy_n(p, size, r.v);
+    return r;
+  }
+  void store(Pack *p) const { std::copy_n(v, size, p); }
+  Pack operator[](int c) const { return v[c]; }
+  void set(int c, const Pack &x) { v[c] = x; }
+  void subtract(const Pack &a, const Row &b, int first = 0) {
+#pragma GCC unroll 7
+    for (int c = first; c < size; ++c) v[c] -= a * b.v[c];
+  }
+  /// The lower triangle from the upper one.
+  static void symmetrise(Row *rows) {
+#pragma GCC unroll 7
+    for (int r = 1; r < size; ++r)
+#pragma GCC unroll 7
+      for (int c = 0; c < r; ++c) rows[r].v[c] = rows[c].v[r];
+  }
+  Row scaled(const Pack &a) const {
+    Row r;
+#pragma GCC unroll 7
+    for (int c = 0; c < size; ++c) r.v[c] = a * v[c];
+    return r;
+  }
+  void add(const Row &b) {
+#pragma GCC unroll 7
+    for (int c = 0; c < size; ++c) v[c] += b.v[c];
+  }
+  void addPositionToEdge() {
+    for (int c = 0; c < 3; ++c) v[edge_at + c] += v[c];
+  }
+  void dropPosition() {
+    for (int c = 0; c < 3; ++c) v[c] = Pack(0.0);
+  }
+};
 
-/// Subtracts from the rows below row j its share, r rows below: l[r] (row[r], row[r + 1], ...). The couplings of one rod lie in two registers and
-/// are shifted there: shifted loads would wait for the stores before them.
-template <int r = 1> inline void subtractBelow(double *row, const Octet &near, const Octet &far, const double *l) {
-  if constexpr (r <= half_band) {
-    double *below = row + r * width<double>;
-    const Octet first = [&]<int... c>(std::integer_sequence<int, c...>) { return __builtin_shufflevector(near, far, std::min(c + r, 15)...); }(std::make_integer_sequence<int, 8>{});
-    octet(below) -= l[r] * first;
-    if constexpr (r < 3) {
-      const Octet second = [&]<int... c>(std::integer_sequence<int, c...>) { return __builtin_shufflevector(far, Octet{}, (c + r)...); }(std::make_integer_sequence<int, 8>{});
-      octet(below + 8) -= l[r] * second;
+/// A symmetric matrix over the state, or one of the state against a ring's border.
+template <class T> using Square = Row<T>[state_size];
+
+/// What is kept of an edge to solve with: G = A^-1 B, where A is the edge's own matrix and B what it has with the state; L and the inverse pivots of
+/// A = L D L'. An edge whose far vertex is held is known from the position, e = -x: its pivots are zero and its rows of G say so.
+template <class T> struct Record {
+  static constexpr int width = Row<T>::size, lower = edge_size * width, pivots = lower + 6;
+  static constexpr int plain = (pivots + edge_size + 7) / 8 * 8; ///< numbers of an edge
+  static constexpr int bordered = plain + edge_size * width;     ///< ... of a ring, with the rows of G for the border behind
+  static constexpr std::size_t of(const RodRange &rod) { return rod.closed ? bordered : plain; }
+};
+
+/// Numbers kept of the first vertex: L and inverse pivots of its position.
+constexpr std::size_t vertex_record = 8;
+
+/// L below the diagonal, row by row.
+constexpr int below(int r, int c) { return r * (r - 1) / 2 + c; }
+
+/// LDL^T of a small matrix: L, the inverse pivots and their signs. `scale`: of what was added to each diagonal.
+template <int n, class T> void factorSmall(T (&a)[n][n], const T *scale, T *lower, T *inverse, T &negative, T &neutral) {
+#pragma GCC unroll 4
+  for (int p = 0; p < n; ++p) {
+    inverse[p] = T(1.0) / countedPivot(a[p][p], scale[p], negative, neutral);
+#pragma GCC unroll 4
+    for (int r = p + 1; r < n; ++r) {
+      const T l = a[p][r] * inverse[p];
+#pragma GCC unroll 4
+      for (int c = r; c < n; ++c) a[r][c] -= l * a[p][c];
+      lower[below(r, p)] = l;
     }
-    subtractBelow<r + 1>(row, near, far, l);
   }
 }
 
-/// Right-looking elimination: each row updates the ten below it, and for a ring the border.
-/// \param far rows x border couplings beyond the band, or null
-template <class T> void eliminate(T *band, T *far, int rows, T &negative, T &neutral) {
-  constexpr int w = width<T>;
-  const int first_border = rows - border;
-  T u[band_width], l[band_width];
-  for (int j = 0; j < rows; ++j) {
-    T *row = band + std::size_t(j) * w;
-    const T diagonal = row[diagonal_place];
-    const T inverse = T(1.0) / countedPivot(row[0], diagonal, negative, neutral);
-    for (int r = 1; r <= half_band; ++r) {
-      u[r] = row[r];
-      l[r] = u[r] * inverse;
+/// x = A^-1 x.
+template <int n, class T> void solveSmall(const T *lower, const T *inverse, T *x) {
+#pragma GCC unroll 4
+  for (int r = 1; r < n; ++r)
+#pragma GCC unroll 4
+    for (int c = 0; c < r; ++c) x[r] -= lower[below(r, c)] * x[c];
+#pragma GCC unroll 4
+  for (int r = n - 1; r >= 0; --r) {
+    x[r] *= inverse[r];
+#pragma GCC unroll 4
+    for (int c = r + 1; c < n; ++c) x[r] -= lower[below(c, r)] * x[c];
+  }
+}
+
+/// The elimination of one rod, or of a pack of rods of one shape. `Read`: read(plane, i) gives an entry of the blocks at local slot i, shift included.
+template <class T, bool ring, class Read> class Elimination {
+public:
+  Elimination(const RodRange &rod, const std::vector<char> &held, const Read &read, T *records)
+      : n_(rod.edges), last_(rod.vertices - 1), held_(held), read_(read), records_(records) {}
+
+  /// \param first receives L and inverse pivots of the first vertex
+  [[gnu::flatten]] void run(T *first) {
+    if (!ring && !held_[last_]) addVertex(last_, state_);
+    for (int i = n_ - 1; i > 0; --i) {
+      if (ring && i == last_)
+        closeRing();
+      else
+        step(i, nextHeld(i));
     }
-    if constexpr (std::is_same_v<T, double>) {
-      const Octet near = octet(row), beyond = octet(row + 8);
-      subtractBelow(row, near, Octet{beyond[0], beyond[1], beyond[2]}, l);
-    } else
-      for (int r = 1; r <= half_band; ++r)
-        for (int c = 0; c <= half_band - r; ++c) row[r * w + c] -= l[r] * u[r + c];
-    // Border rows beyond the band of row j: they meet the rows within it, and each other.
-    for (int q = 0; far && q < border; ++q) {
-      const int i = first_border + q;
-      if (i - j <= half_band) continue;
-      T *column = far + std::size_t(j) * border;
-      const T lq = column[q] * inverse;
-      for (int r = 1; r <= half_band && j + r < i; ++r) {
-        const int k = j + r;
-        if (i - k > half_band)
-          far[std::size_t(k) * border + q] -= lq * u[r];
-        else
-          band[std::size_t(k) * w + (i - k)] -= lq * u[r];
+    firstEdge();
+    using std::abs;
+    T a[3][3], scale[3];
+    for (int r = 0; r < 3; ++r) {
+      for (int c = r; c < 3; ++c) a[r][c] = state_[r][c];
+      scale[r] = abs(a[r][r]);
+    }
+    if (!held_[0])
+      factorSmall<3>(a, scale, first, first + 3, negative, neutral);
+    else
+      std::fill_n(first, 6, T(0.0));
+  }
+
+  T negative{0.0}, neutral{0.0};
+
+private:
+  static constexpr int width = Record<T>::width;
+  const int n_, last_;
+  const std::vector<char> &held_;
+  const Read &read_;
+  T *const records_;
+  Square<T> state_;
+  Square<T> mixed_, corner_; ///< of a ring: state with border, border with itself
+
+  T *record(int i) const { return records_ + std::size_t(i) * (ring ? Record<T>::bordered : Record<T>::plain); }
+  bool nextHeld(int i) const { return held_[ring && i == last_ ? 0 : i + 1]; }
+  T own(int r, int c, int i) const { return read_(EdgeBlocks::own(std::min(r, c), std::max(r, c)), i); }
+  /// Couplings of the edge before with variable c of edge i, as a row over the state.
+  Row<T> across(int c, int i) const {
+    Row<T> row;
+#pragma GCC unroll 4
+    for (int r = 0; r < edge_size; ++r) row.set(edge_at + r, read_(EdgeBlocks::across(r, c), i));
+    return row;
+  }
+  void addVertex(int i, Square<T> &to) const {
+#pragma GCC unroll 3
+    for (int r = 0; r < 3; ++r)
+#pragma GCC unroll 3
+      for (int c = 0; c < 3; ++c) to[r].set(c, to[r][c] + read_(EdgeBlocks::vertex(std::min(r, c), std::max(r, c)), i));
+  }
+
+  /// From the far vertex of an edge to its near one: x_{i+1} = x_i + e_i, or zero where it is held.
+  void moveBack(bool held) {
+    if (held) {
+#pragma GCC unroll 7
+      for (int r = 0; r < state_size; ++r) state_[r].dropPosition();
+#pragma GCC unroll 3
+      for (int r = 0; r < 3; ++r) state_[r] = {};
+    } else {
+#pragma GCC unroll 7
+      for (int r = 0; r < state_size; ++r) state_[r].addPositionToEdge();
+#pragma GCC unroll 3
+      for (int r = 0; r < 3; ++r) state_[edge_at + r].add(state_[r]);
+    }
+    if (!ring) return;
+    for (int r = 0; r < 3; ++r)
+      if (held)
+        mixed_[r] = {};
+      else
+        mixed_[edge_at + r].add(mixed_[r]);
+  }
+
+  /// Eliminates edge i from the state beyond its far vertex; leaves that beyond its near one.
+  void step(int i, bool held) {
+    moveBack(held);
+    if (held)
+      substitute(i);
+    else
+      eliminate(i);
+  }
+
+  void eliminate(int i) {
+    using std::abs;
+    T a[edge_size][edge_size], scale[edge_size];
+    Row<T> b[edge_size];
+#pragma GCC unroll 4
+    for (int r = 0; r < edge_size; ++r) {
+#pragma GCC unroll 4
+      for (int c = r; c < edge_size; ++c) a[r][c] = state_[edge_at + r][edge_at + c] + own(r, c, i);
+      scale[r] = abs(state_[edge_at + r][edge_at + r]) + abs(own(r, r, i));
+      b[r] = across(r, i);
+#pragma GCC unroll 3
+      for (int c = 0; c < 3; ++c) b[r].set(c, state_[edge_at + r][c]);
+    }
+    T *const out = record(i), *const lower = out + Record<T>::lower, *const inverse = out + Record<T>::pivots;
+    T l[6], d[edge_size];
+    factorSmall<edge_size>(a, scale, l, d, negative, neutral);
+    std::copy_n(l, 6, lower);
+    std::copy_n(d, edge_size, inverse);
+    reduce(b, l);
+    Square<T> next;
+#pragma GCC unroll 3
+    for (int r = 0; r < 3; ++r) {
+      next[r] = state_[r];
+      for (int c = edge_at; c < state_size; ++c) next[r].set(c, T(0.0));
+    }
+    addVertex(i, next);
+    T y[edge_size][width]; // the rows of L^-1 B as scalars
+    Row<T> z[edge_size];
+#pragma GCC unroll 4
+    for (int p = 0; p < edge_size; ++p) {
+      b[p].store(y[p]);
+      z[p] = b[p].scaled(d[p]);
+    }
+#pragma GCC unroll 4
+    for (int p = 0; p < edge_size; ++p)
+#pragma GCC unroll 7
+      for (int k = 0; k < state_size; ++k) next[k].subtract(y[p][k], z[p], k);
+    Row<T>::symmetrise(next);
+    if constexpr (ring) {
+      Row<T> bs[edge_size];
+      for (int r = 0; r < edge_size; ++r) {
+        bs[r] = mixed_[edge_at + r];
+        mixed_[edge_at + r] = {};
       }
-      for (int p = q; p < border; ++p) band[std::size_t(i) * w + (p - q)] -= lq * column[p];
-      column[q] = lq;
+      reduce(bs, l);
+      border(y, bs, d, l, out);
     }
-    row[0] = inverse;
-    for (int r = 1; r <= half_band; ++r) row[r] = l[r];
+    complete(z, l, out);
+#pragma GCC unroll 7
+    for (int k = 0; k < state_size; ++k) state_[k] = next[k];
   }
-}
 
-/// x = A^-1 x; ten rows before and behind the first and last of `band` and `x` are zero.
-template <class T> void substitute(const T *band, const T *far, int rows, T *x) {
-  constexpr int w = width<T>;
-  const int first_border = rows - border;
-  // The nearest neighbour last and alone: the rest of a sum does not wait for it.
-  T last(0.0);
-  for (int j = 0; j < rows; ++j) {
-    const T *above = band + std::ptrdiff_t(j - half_band) * w;
-    auto share = [&](int r) { return above[(half_band - r) * w + r] * x[j - r]; };
-    const T even = (share(10) + share(8)) + (share(6) + (share(4) + share(2))), odd = (share(9) + share(7)) + (share(5) + share(3));
-    T value = x[j] - (even + odd);
-    if (far && j >= first_border)
-      for (int k = 0; j - k > half_band; ++k) value -= far[std::size_t(k) * border + (j - first_border)] * x[k];
-    last = value - above[(half_band - 1) * w + 1] * last;
-    x[j] = last;
+  /// rows = L^-1 rows
+  static void reduce(Row<T> (&rows)[edge_size], const T *l) {
+#pragma GCC unroll 4
+    for (int r = 1; r < edge_size; ++r)
+#pragma GCC unroll 4
+      for (int c = 0; c < r; ++c) rows[r].subtract(l[below(r, c)], rows[c]);
   }
-  last = T(0.0);
-  for (int j = rows - 1; j >= 0; --j) {
-    const T *row = band + std::size_t(j) * w;
-    auto share = [&](int r) { return row[r] * x[j + r]; };
-    const T even = (share(10) + share(8)) + (share(6) + (share(4) + share(2))), odd = (share(9) + share(7)) + (share(5) + share(3));
-    T value = x[j] * row[0] - (even + odd);
-    for (int q = 0; far && q < border; ++q)
-      if (first_border + q - j > half_band) value -= far[std::size_t(j) * border + q] * x[first_border + q];
-    last = value - row[1] * last;
-    x[j] = last;
+
+  /// Stores rows = L^-T rows.
+  static void complete(Row<T> (&rows)[edge_size], const T *l, T *out) {
+#pragma GCC unroll 4
+    for (int r = edge_size - 1; r >= 0; --r) {
+#pragma GCC unroll 4
+      for (int c = r + 1; c < edge_size; ++c) rows[r].subtract(l[below(c, r)], rows[c]);
+      rows[r].store(out + r * width);
+    }
   }
+
+  /// What the elimination of an edge does to the border, given the reduced rows of the state and of the border.
+  void border(const T (&y)[edge_size][width], const Row<T> (&bs)[edge_size], const T *d, const T *l, T *out) {
+    Row<T> z[edge_size];
+    for (int p = 0; p < edge_size; ++p) {
+      T ys[width];
+      bs[p].store(ys);
+      z[p] = bs[p].scaled(d[p]);
+      for (int k = 0; k < state_size; ++k) {
+        mixed_[k].subtract(y[p][k], z[p]);
+        corner_[k].subtract(ys[k], z[p]);
+      }
+    }
+    complete(z, l, out + Record<T>::plain);
+  }
+
+  /// Edge i between vertex i and a held one: e = -x. Only its twist is eliminated.
+  void substitute(int i) {
+    Square<T> next;
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c)
+        next[r].set(c, (state_[r][c] - state_[r][edge_at + c]) - (state_[edge_at + r][c] - (state_[edge_at + r][edge_at + c] + own(r, c, i))));
+      const Row<T> before = across(r, i);
+      for (int c = edge_at; c < state_size; ++c) {
+        next[r].set(c, -before[c]);
+        next[c].set(r, -before[c]);
+      }
+    }
+    addVertex(i, next);
+    constexpr int twist = state_size - 1;
+    Row<T> b = across(3, i);
+    for (int c = 0; c < 3; ++c) b.set(c, state_[twist][c] - (state_[twist][edge_at + c] + own(c, 3, i)));
+    if constexpr (ring) {
+      for (int r = 0; r < 3; ++r) mixed_[r].subtract(T(1.0), mixed_[edge_at + r]);
+      for (int r = 0; r < 3; ++r) mixed_[edge_at + r] = {};
+      const Row<T> bs = mixed_[twist];
+      mixed_[twist] = {};
+      eliminateTwist(i, next, b, bs);
+    } else
+      eliminateTwist(i, next, b, {});
+  }
+
+  void eliminateTwist(int i, Square<T> &next, const Row<T> &b, const Row<T> &bs) {
+    using std::abs;
+    constexpr int twist = state_size - 1;
+    const T scale = abs(state_[twist][twist]) + abs(own(3, 3, i));
+    T *const out = record(i);
+    std::fill_n(out, Record<T>::plain, T(0.0));
+    const T inverse = T(1.0) / countedPivot(T(state_[twist][twist] + own(3, 3, i)), scale, negative, neutral);
+    const Row<T> z = b.scaled(inverse);
+    for (int k = 0; k < state_size; ++k) next[k].subtract(b[k], z);
+    for (int r = 0; r < 3; ++r) out[r * width + r] = T(1.0);
+    z.store(out + 3 * width);
+    out[Record<T>::pivots + 3] = inverse;
+    if constexpr (ring) {
+      const Row<T> zs = bs.scaled(inverse);
+      for (int k = 0; k < state_size; ++k) {
+        mixed_[k].subtract(b[k], zs);
+        corner_[k].subtract(bs[k], zs);
+      }
+      std::fill_n(out + Record<T>::plain, 3 * width, T(0.0));
+      zs.store(out + Record<T>::plain + 3 * width);
+    }
+    for (int k = 0; k < state_size; ++k) state_[k] = next[k];
+  }
+
+  /// The last edge of a ring ends where the first begins, e = x_0 - x, and meets it in the cell behind the ring.
+  void closeRing() {
+    const int i = last_;
+    Square<T> next;
+    Row<T> b = across(3, i), bs;
+    for (int r = 0; r < 3; ++r) {
+      const Row<T> before = across(r, i);
+      for (int c = 0; c < 3; ++c) {
+        next[r].set(c, own(r, c, i));
+        mixed_[r].set(c, -own(r, c, i));
+        corner_[r].set(c, own(r, c, i));
+      }
+      for (int c = edge_at; c < state_size; ++c) {
+        next[r].set(c, -before[c]);
+        next[c].set(r, -before[c]);
+        mixed_[c].set(r, before[c]);
+      }
+      for (int p = 0; p < edge_size; ++p) {
+        const T o = read_(EdgeBlocks::across(r, p), i + 1);
+        mixed_[r].set(edge_at + p, -o);
+        corner_[r].set(edge_at + p, o);
+        corner_[edge_at + p].set(r, o);
+      }
+      b.set(r, -own(r, 3, i));
+      bs.set(r, own(r, 3, i));
+    }
+    for (int p = 0; p < edge_size; ++p) bs.set(edge_at + p, read_(EdgeBlocks::across(3, p), i + 1));
+    addVertex(i, next);
+    eliminateTwist(i, next, b, bs);
+    for (int r = 0; r < 3; ++r) record(i)[Record<T>::plain + r * width + r] = T(-1.0);
+  }
+
+  /// Behind it there is no edge, but in a ring the border joins in: it is this edge and its near vertex.
+  void firstEdge() {
+    moveBack(nextHeld(0));
+    if constexpr (ring) {
+      for (int r = 0; r < state_size; ++r)
+        for (int c = r; c < state_size; ++c) {
+          const T v = state_[r][c] + (mixed_[r][c] + mixed_[c][r]) + corner_[r][c];
+          state_[r].set(c, v);
+          state_[c].set(r, v);
+        }
+      for (Row<T> &row : mixed_) row = {};
+    }
+    nextHeld(0) ? substitute(0) : eliminate(0);
+  }
+};
+
+/// Values of the slots of a rod, right-hand side to solution, by the records of its factor.
+template <class T, bool ring>
+[[gnu::flatten]] void substituteAll(const RodRange &rod, const std::vector<char> &held, const T *records, const T *first, T *values) {
+  constexpr int w = Record<T>::width;
+  constexpr std::size_t size = ring ? Record<T>::bordered : Record<T>::plain;
+  const int last = rod.vertices - 1;
+  auto nextHeld = [&](int i) { return held[ring && i == last ? 0 : i + 1]; };
+  T q[state_size], border[state_size];
+  std::fill_n(q, state_size, T(0.0));
+  std::fill_n(border, state_size, T(0.0));
+  if (!ring)
+    for (int a = 0; a < 3; ++a) q[a] = values[slot_size * last + a];
+  for (int i = rod.edges - 1; i >= 0; --i) {
+    const T *g = records + size * i;
+    T *here = values + slot_size * i;
+    T r[edge_size];
+    const bool drops = nextHeld(i) || (ring && i == last);
+#pragma GCC unroll 3
+    for (int a = 0; a < 3; ++a) {
+      if (drops) q[a] = T(0.0);
+      if (ring && i == 0) {
+        r[a] = (q[edge_at + a] + q[a]) + border[edge_at + a];
+        q[a] += border[a];
+      } else
+        r[a] = q[edge_at + a] + q[a];
+    }
+    r[3] = q[edge_at + 3] + here[3];
+    if (ring && i == 0) r[3] += border[edge_at + 3];
+    T next[state_size];
+#pragma GCC unroll 7
+    for (int c = 0; c < state_size; ++c) {
+      T share = g[c] * r[0];
+#pragma GCC unroll 4
+      for (int p = 1; p < edge_size; ++p) share += g[p * w + c] * r[p];
+      next[c] = (c < 3 ? q[c] + here[c] : T(0.0)) - share;
+      if (ring && i > 0) {
+        const T *gs = g + Record<T>::plain;
+        T far = gs[c] * r[0];
+        for (int p = 1; p < edge_size; ++p) far += gs[p * w + c] * r[p];
+        border[c] -= far;
+      }
+    }
+#pragma GCC unroll 4
+    for (int p = 0; p < edge_size; ++p) here[p] = r[p];
+#pragma GCC unroll 7
+    for (int c = 0; c < state_size; ++c) q[c] = next[c];
+  }
+  T u[state_size];
+  std::fill_n(u, state_size, T(0.0));
+  if (!held[0]) {
+    std::copy_n(q, 3, u);
+    solveSmall<3>(first, first + 3, u);
+  }
+  std::copy_n(u, 3, border);
+  for (int i = 0; i < rod.edges; ++i) {
+    const T *g = records + size * i;
+    T *here = values + slot_size * i;
+    T v[edge_size];
+    std::copy_n(here, edge_size, v);
+    solveSmall<edge_size>(g + Record<T>::lower, g + Record<T>::pivots, v);
+    if (ring && i > 0) {
+      const T *gs = g + Record<T>::plain;
+      for (int p = 0; p < edge_size; ++p)
+        for (int c = 0; c < state_size; ++c) v[p] -= gs[p * w + c] * border[c];
+    }
+#pragma GCC unroll 4
+    for (int p = 0; p < edge_size; ++p) {
+      // Two sums: the position before the edge is known earlier than the edge before.
+      T share = g[p * w] * u[0];
+#pragma GCC unroll 3
+      for (int c = 1; c < 3; ++c) share += g[p * w + c] * u[c];
+      T turn = g[p * w + edge_at] * u[edge_at];
+#pragma GCC unroll 4
+      for (int c = edge_at + 1; c < state_size; ++c) turn += g[p * w + c] * u[c];
+      v[p] = (v[p] - share) - turn;
+    }
+    if (ring && i == 0)
+      for (int p = 0; p < edge_size; ++p) border[edge_at + p] = v[p];
+    const bool drops = nextHeld(i);
+#pragma GCC unroll 3
+    for (int a = 0; a < 3; ++a) {
+      here[a] = u[a];
+      u[a] = drops ? T(0.0) : u[a] + v[a];
+    }
+    here[3] = v[3];
+#pragma GCC unroll 4
+    for (int p = 0; p < edge_size; ++p) u[edge_at + p] = v[p];
+  }
+  if (ring) return;
+  for (int a = 0; a < 3; ++a) values[slot_size * last + a] = u[a];
+  values[slot_size * last + 3] = T(0.0);
 }
 
 } // namespace
 
-BandedFactor::BandedFactor(const DofMap &dofs, RodSet set, BandedRoom &room)
-    : dofs_(dofs), rods_(set), order_(set.end - set.begin), fixed_(order_.size()), negative_(order_.size(), 0), neutral_(order_.size(), 0), room_(room) {
+BandedFactor::BandedFactor(const DofMap &dofs, RodSet set, BandedWorkspace &workspace)
+    : dofs_(dofs), rods_(set), order_(set.end - set.begin), held_(order_.size()), negative_(order_.size(), 0), neutral_(order_.size(), 0),
+      workspace_(workspace) {
   const auto &rods = dofs.rods();
-  auto shape = [&](int r) { return std::pair(rods[r].vertices, rods[r].closed); };
-  std::iota(order_.begin(), order_.end(), set.begin);
-  std::stable_sort(order_.begin(), order_.end(), [&](int a, int b) { return shape(a) < shape(b); });
-  for (int r = set.begin; r < set.end; ++r)
-    for (int i = 0; i < rods[r].vertices; ++i)
-      for (int a = 0; a < slot_size; ++a)
-        if (dofs.unknown(rods[r].slot(i), a) < 0) fixed_[r - set.begin].push_back(slot_size * i + a);
-  plan(nullptr); // no smaller set of rods needs more room
-  std::size_t band = 0, far = 0, rows = 0;
-  for (const Group &g : groups_) {
-    const std::size_t n = std::size_t(slot_size) * rods[g.rod[0]].vertices + 2 * half_band;
-    band = g.band + n * (g.packed ? width<Pack> * lanes : width<double>);
-    far = std::max(far, g.far + n * border * (g.packed ? lanes : 1));
-    rows = std::max(rows, n * (g.packed ? lanes : 1));
+  std::size_t rows = 0;
+  for (int r = set.begin; r < set.end; ++r) {
+    for (int i = 0; i < rods[r].vertices; ++i) held_[r - set.begin].push_back(dofs.isHeld(rods[r].first_vertex + i));
+    rows = std::max(rows, std::size_t(slot_size) * rods[r].vertices);
   }
+  std::iota(order_.begin(), order_.end(), set.begin);
+  auto shape = [&](int r) { return std::tuple(rods[r].vertices, rods[r].closed, rods[r].twist); };
+  std::stable_sort(order_.begin(), order_.end(), [&](int a, int b) {
+    if (shape(a) != shape(b)) return shape(a) < shape(b);
+    return held_[a - set.begin] < held_[b - set.begin];
+  });
   auto grow = [&](AlignedVector &v, std::size_t size) {
     if (v.size() < size) v.resize(size, 0.0);
     bytes_ += size * sizeof(double);
   };
-  grow(room.band, band);
-  grow(room.far, far);
-  grow(room.rows, rows);
+  grow(workspace.factors, plan(nullptr)); // no smaller set of rods needs more
+  grow(workspace.rows, rows * lanes);
+}
+
+bool BandedFactor::sameShape(int a, int b) const {
+  const RodRange &one = dofs_.rods()[a], &other = dofs_.rods()[b];
+  return one.vertices == other.vertices && one.closed == other.closed && one.twist == other.twist && held_[a - rods_.begin] == held_[b - rods_.begin];
 }
 
 /// Groups of the wanted rods of each shape: whole packs; of the rest, a pack when that is cheaper than one after the other.
-void BandedFactor::plan(const char *wanted) {
+/// Returns how many numbers their factors take.
+std::size_t BandedFactor::plan(const char *wanted) {
   constexpr int worth_a_pack = 3;
-  const auto &rods = dofs_.rods();
   groups_.clear();
-  std::size_t band = 0, far = 0;
+  std::size_t size = 0;
   auto close = [&](Group group, bool packed) {
-    const RodRange &rod = rods[group.rod[0]];
-    const std::size_t n = std::size_t(slot_size) * rod.vertices + 2 * half_band;
+    const RodRange &rod = dofs_.rods()[group.rod[0]];
     group.packed = packed;
-    group.band = band;
-    group.far = far;
-    band += n * (packed ? width<Pack> * lanes : width<double>);
-    if (rod.closed) far += n * border * (packed ? lanes : 1);
+    group.factor = size;
+    size += packed ? lanes * (vertex_record + rod.edges * Record<Pack>::of(rod)) : vertex_record + rod.edges * Record<double>::of(rod);
     groups_.push_back(group);
   };
   Group open{};
@@ -180,11 +552,11 @@ void BandedFactor::plan(const char *wanted) {
   };
   for (const int r : order_) {
     if (wanted && !wanted[r]) continue;
-    const RodRange &rod = rods[r];
-    if (open.count == lanes || (open.count > 0 && (rods[open.rod[0]].vertices != rod.vertices || rods[open.rod[0]].closed != rod.closed))) flush();
+    if (open.count == lanes || (open.count > 0 && !sameShape(open.rod[0], r))) flush();
     open.rod[open.count++] = r;
   }
   flush();
+  return size;
 }
 
 void BandedFactor::factor(const BandedSystem &system) {
@@ -197,75 +569,48 @@ void BandedFactor::factor(const BandedSystem &system) {
 }
 
 template <class T> void BandedFactor::factorGroup(const Group &group, const BandedSystem &system) {
-  constexpr int w = width<T>, tile = 16;
   const RodRange &first = dofs_.rods()[group.rod[0]];
-  const int n = first.vertices, rows = slot_size * n;
-  T *band = as<T>(&room_.band[group.band]) + half_band * w;
-  T *far = first.closed ? as<T>(&room_.far[group.far]) : nullptr;
-  std::fill(band - half_band * w, band, T(0.0));
-  std::fill(band + std::size_t(rows) * w, band + std::size_t(rows + half_band) * w, T(0.0));
-  std::array<const double *, lanes> source{};
-  for (int l = 0; l < (group.packed ? lanes : 1); ++l) source[l] = system.band->entry(dofs_.rods()[group.rod[l]], 0, 0);
-  auto entry = [&](int a, int k, int i) {
-    const std::size_t at = std::size_t(a * band_width + k) * first.slots + i;
+  std::array<const double *, lanes> source{}, mass{}, spin{};
+  std::array<double, lanes> shift{};
+  bool shifted = false;
+  for (int l = 0; l < (group.packed ? lanes : 1); ++l) {
+    const RodRange &rod = dofs_.rods()[group.rod[l]];
+    source[l] = system.blocks->entry(rod, 0);
+    mass[l] = (*system.metric)[0] + rod.first_slot;
+    spin[l] = (*system.metric)[3] + rod.first_slot;
+    shift[l] = (*system.shift)[group.rod[l]];
+    shifted = shifted || shift[l] != 0;
+  }
+  const bool cable = !first.twist;
+  auto value = [&](std::size_t at, auto added) {
     if constexpr (std::is_same_v<T, Pack>)
-      return Pack([&](auto lane) { return source[lane][at]; });
+      return Pack([&](auto lane) { return source[lane][at] + added(lane); });
     else
-      return source[0][at];
+      return source[0][at] + added(0);
   };
-  for (int begin = 0; begin < n; begin += tile)
-    for (int a = 0; a < slot_size; ++a)
-      for (int k = 0; k < band_width; ++k)
-        for (int i = begin; i < std::min(begin + tile, n); ++i) band[std::size_t(slot_size * i + a) * w + k] = entry(a, k, i);
-  if (far) { // couplings of the last two slots to the first: beyond the band unless the ring is very small
-    std::fill(far, far + std::size_t(rows) * border, T(0.0));
-    for (int i = n - 2; i < n; ++i)
-      for (int a = 0; a < slot_size; ++a)
-        for (int k = std::max(0, rows - slot_size * i - a); k < band_width; ++k) {
-          const int p = slot_size * i + a, q = p + k - rows;
-          T &own = band[std::size_t(p) * w + k];
-          if (p - q > half_band)
-            far[std::size_t(q) * border + (p - (rows - border))] += own;
-          else
-            band[std::size_t(q) * w + (p - q)] += own;
-          own = T(0.0);
-        }
-  }
-  for (int l = 0; l < group.count; ++l) {
-    const int r = group.rod[l];
-    const RodRange &rod = dofs_.rods()[r];
-    auto set = [&](T &value, double v) {
-      if constexpr (std::is_same_v<T, Pack>)
-        value[l] = v;
-      else
-        value = v;
-    };
-    if ((*system.shift)[r] != 0)
-      for (int row = 0; row < rows; ++row) {
-        T &d = band[std::size_t(row) * w];
-        const double shift = (*system.shift)[r] * (*system.metric)[row % slot_size][rod.slot(row / slot_size)];
-        if constexpr (std::is_same_v<T, Pack>)
-          d[l] = d[l] + shift;
-        else
-          d += shift;
-      }
-    for (const int row : fixed_[r - rods_.begin]) {
-      set(band[std::size_t(row) * w], 1);
-      for (int k = 1; k <= half_band; ++k) {
-        set(band[std::size_t(row) * w + k], 0);
-        if (row >= k) set(band[std::size_t(row - k) * w + k], 0);
-      }
-      if (!far) continue;
-      for (int q = 0; q < border; ++q) {
-        set(far[std::size_t(row) * border + q], 0);
-        if (row == rows - border + q)
-          for (int j = 0; j < rows; ++j) set(far[std::size_t(j) * border + q], 0);
-      }
-    }
-  }
-  for (int row = 0; row < rows; ++row) band[std::size_t(row) * w + diagonal_place] = band[std::size_t(row) * w];
-  T negative(0.0), neutral(0.0);
-  eliminate(band, far, rows, negative, neutral);
+  auto plain = [&](int plane, int i) { return value(std::size_t(plane) * first.slots + i, [](int) { return 0.0; }); };
+  // A shift adds to the diagonal of positions and twists; the twist of a cable is no unknown.
+  auto rare = [&](int plane, int i) {
+    const std::size_t at = std::size_t(plane) * first.slots + i;
+    if (plane == EdgeBlocks::own(3, 3)) return value(at, [&](int l) { return cable ? 1.0 : shift[l] * spin[l][i]; });
+    if (plane == EdgeBlocks::vertex(0, 0) || plane == EdgeBlocks::vertex(1, 1) || plane == EdgeBlocks::vertex(2, 2))
+      return value(at, [&](int l) { return shift[l] * mass[l][i]; });
+    return value(at, [](int) { return 0.0; });
+  };
+  const std::vector<char> &held = held_[group.rod[0] - rods_.begin];
+  T *const vertex = as<T>(&workspace_.factors[group.factor]), *const records = vertex + vertex_record;
+  T negative, neutral;
+  auto run = [&](auto elimination) {
+    elimination.run(vertex);
+    negative = elimination.negative;
+    neutral = elimination.neutral;
+  };
+  if (first.closed)
+    run(Elimination<T, true, decltype(rare)>(first, held, rare, records));
+  else if (shifted || cable)
+    run(Elimination<T, false, decltype(rare)>(first, held, rare, records));
+  else
+    run(Elimination<T, false, decltype(plain)>(first, held, plain, records));
   for (int l = 0; l < group.count; ++l)
     if constexpr (std::is_same_v<T, Pack>) {
       negative_[group.rod[l] - rods_.begin] = int(negative[l]);
@@ -281,8 +626,8 @@ void BandedFactor::solve(const PetscScalar *b, PetscScalar *x) {
   for (const Group &group : groups_) solved += group.count;
   if (solved < order_.size()) {
     if (x == b) {
-      room_.copy.assign(b, b + dofs_.unknowns(rods_));
-      b = room_.copy.data();
+      workspace_.copy.assign(b, b + dofs_.unknowns(rods_));
+      b = workspace_.copy.data();
     }
     std::fill_n(x, dofs_.unknowns(rods_), 0.0);
   }
@@ -296,28 +641,35 @@ void BandedFactor::solve(const PetscScalar *b, PetscScalar *x) {
 template <class T> void BandedFactor::solveGroup(const Group &group, const PetscScalar *b, PetscScalar *x) {
   constexpr int step = sizeof(T) / sizeof(double);
   const RodRange &first = dofs_.rods()[group.rod[0]];
-  const int rows = slot_size * first.vertices;
-  const T *band = as<T>(&room_.band[group.band]) + half_band * width<T>;
-  const T *far = first.closed ? as<T>(&room_.far[group.far]) : nullptr;
-  double *values = room_.rows.data() + half_band * step;
-  std::fill(values - half_band * step, values, 0.0);
-  std::fill(values + std::size_t(rows) * step, values + std::size_t(rows + half_band) * step, 0.0);
-  auto eachUnknown = [&](auto visit) {
+  const std::vector<char> &held = held_[group.rod[0] - rods_.begin];
+  const T *const vertex = as<T>(&workspace_.factors[group.factor]), *const records = vertex + vertex_record;
+  double *const values = workspace_.rows.data();
+  // Calls visit(value, unknown) for the unknowns and rest(value) for what is held or does not exist.
+  auto eachValue = [&](auto visit, auto rest) {
     for (int l = 0; l < group.count; ++l) {
       const int r = group.rod[l];
       PetscInt u = dofs_.firstUnknown({r, r + 1}) - dofs_.firstUnknown(rods_);
-      const std::vector<int> &fixed = fixed_[r - rods_.begin];
-      for (std::size_t f = 0, row = 0; row < std::size_t(rows); ++row)
-        if (f < fixed.size() && fixed[f] == int(row)) {
-          values[row * step + l] = 0;
-          ++f;
-        } else
-          visit(values[row * step + l], u++);
+      double *v = values + l;
+      for (int i = 0; i < first.vertices; ++i) {
+        for (int a = 0; a < 3; ++a, v += step)
+          if (held[i])
+            rest(*v);
+          else
+            visit(*v, u++);
+        if (first.twist && i < first.edges)
+          visit(*v, u++);
+        else
+          rest(*v);
+        v += step;
+      }
     }
   };
-  eachUnknown([&](double &value, PetscInt u) { value = b[u]; });
-  substitute<T>(band, far, rows, as<T>(values));
-  eachUnknown([&](const double &value, PetscInt u) { x[u] = value; });
+  eachValue([&](double &value, PetscInt u) { value = b[u]; }, [](double &value) { value = 0; });
+  if (first.closed)
+    substituteAll<T, true>(first, held, records, vertex, as<T>(values));
+  else
+    substituteAll<T, false>(first, held, records, vertex, as<T>(values));
+  eachValue([&](const double &value, PetscInt u) { x[u] = value; }, [](double &) {});
 }
 
 namespace {
@@ -363,7 +715,7 @@ PetscErrorCode inertia(Mat f, PetscInt *negative, PetscInt *zero, PetscInt *posi
 PetscErrorCode getInfo(Mat f, MatInfoType, MatInfo *info) {
   PetscFunctionBegin;
   *info = {};
-  info->nz_used = info->nz_allocated = double(f->rmap->n) * band_width;
+  info->nz_used = info->nz_allocated = double(f->rmap->n) * Record<double>::plain / slot_size;
   info->memory = double(factorOf(f)->bytes());
   PetscFunctionReturn(0);
 }
@@ -399,7 +751,7 @@ PetscErrorCode create(Mat a, MatFactorType, Mat *out) {
   PetscCall(MatSetSizes(f, a->rmap->n, a->cmap->n, a->rmap->N, a->cmap->N));
   PetscCall(PetscStrallocpy(name, &((PetscObject)f)->type_name));
   PetscCall(MatSetUp(f));
-  f->data = new BandedFactor(*system->dofs, system->rods, *system->room);
+  f->data = new BandedFactor(*system->dofs, system->rods, *system->workspace);
   f->ops->choleskyfactorsymbolic = symbolic;
   f->ops->getinfo = getInfo;
   f->ops->destroy = destroy;
@@ -423,7 +775,7 @@ PetscErrorCode multiply(Mat a, Vec x, Vec y) {
   PetscCall(dofs.scatter(x, system->rods, in));
   for (int r = system->rods.begin; r < system->rods.end; ++r) {
     const RodRange &rod = dofs.rods()[r];
-    system->band->multiply(rod, in, out);
+    system->blocks->multiply(rod, in, out);
     dofs.fold(rod, out);
     for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
       for (int k = 0; k < slot_size; ++k) out[k][s] += (*system->shift)[r] * (*system->metric)[k][s] * in[k][s];

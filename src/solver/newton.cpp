@@ -94,7 +94,7 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
   DofMap &dofs = potential.dofs();
   work_ = &work;
   if (circulatory_.emplace(potential, set); circulatory_->isNone()) circulatory_.reset();
-  system_ = {&dofs, set, &potential.band(), &work.metric, &work.wanted, &work.shift, &work.room};
+  system_ = {&dofs, set, &potential.blocks(), &work.metric, &work.wanted, &work.shift, &work.workspace};
   const bool whole = set.begin == 0 && set.end == dofs.all().end;
   if (whole)
     PetscCall(DMCreateGlobalVector(dofs.dm(), x_.out()));
@@ -186,14 +186,14 @@ PetscErrorCode NewtonSolver::assemble(Mat) {
   PetscFunctionReturn(0);
 }
 
-/// The matrix to the present band and shifts.
+/// The matrix to the present blocks and shifts.
 PetscErrorCode NewtonSolver::refill() {
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(events().fill, 0, 0, 0, 0));
   if (banded_)
     PetscCall(PetscObjectStateIncrease((PetscObject)jacobian_.object()));
   else {
-    PetscCall(potential_->dofs().fillMatrix(potential_->band(), jacobian_));
+    PetscCall(potential_->dofs().fillMatrix(potential_->blocks(), jacobian_));
     if (std::any_of(work_->shift.begin() + rods_.begin, work_->shift.begin() + rods_.end, [](double shift) { return shift != 0; })) {
       Planes diagonal = work_->metric;
       for (int r = rods_.begin; r < rods_.end; ++r) {
@@ -308,7 +308,7 @@ PetscErrorCode NewtonSolver::includeMotion(Vec y) {
   for (int r = rods_.begin; r < rods_.end; ++r) {
     const RodRange &rod = dofs.rods()[r];
     for (int a = 0; a < slot_size; ++a) std::copy(gradient[a] + rod.first_slot, gradient[a] + rod.vertexEnd() + 2, right[a] + rod.first_slot);
-    potential_->band().multiply(rod, work_->motion, right);
+    potential_->blocks().multiply(rod, work_->motion, right);
     dofs.fold(rod, right);
   }
   PetscCall(dofs.gather(right, rods_, right_, &work_->wanted));

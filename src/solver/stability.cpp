@@ -71,11 +71,12 @@ PetscErrorCode NewtonSolver::shiftUntilPositive(bool regular) {
 /// is not the cause, inverse iteration with the shifted Hessian finds the lowest mode. `neutral`: the mode costs no energy, to rounding, and
 /// nothing goes down: a turn of the whole rod about an axis, say.
 PetscErrorCode NewtonSolver::findBucklingMode(bool *found, bool *neutral) {
-  constexpr double rounding = 1e-7; // of the energies that balance: stiff edges leave that much of them
+  // Of the energies that balance, stiff edges leave 1e-7 by rounding; and what the forces are out of balance by, a neutral motion is curved by.
+  const double rounding = std::clamp(10 * report_.residual.force, 1e-7, 1e-5);
   PetscFunctionBeginUser;
   const DofMap &dofs = potential_->dofs();
   const Elements &e = potential_->elements();
-  Band softening = potential_->derivatives(rods_).band;
+  EdgeBlocks softening = potential_->derivatives(rods_).blocks;
   auto weighted = [&](const Planes &a, const Planes &b, const Planes *weight) {
     double sum = 0;
     for (int r = rods_.begin; r < rods_.end; ++r)
@@ -99,7 +100,7 @@ PetscErrorCode NewtonSolver::findBucklingMode(bool *found, bool *neutral) {
   PetscCall(readInertia(&regular));
   const bool buckles = regular && report_.negative_pivots == 0;
   if (buckles)
-    softening.subtractFrom(potential_->band());
+    softening.subtractFrom(potential_->blocks());
   else {
     for (int r = rods_.begin; r < rods_.end; ++r) potential_->assembleRod(r, HessianKind::exact);
     PetscCall(shiftUntilPositive(false));

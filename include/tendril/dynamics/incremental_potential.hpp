@@ -45,7 +45,7 @@ public:
   double energy(const Configuration &configuration) const { return energy(configuration, all()); }
   /// Room for the derivatives of some rods; those of others are forgotten. Derivatives of other rods need room for all.
   void focus(RodSet rods);
-  /// Gradient, equilibrium residual and Hessian band at the iterates of some rods, computed once per iterate.
+  /// Gradient, equilibrium residual and Hessian blocks at the iterates of some rods, computed once per iterate.
   const Derivatives &derivatives(RodSet rods);
   /// The same without the Hessian where it is not known yet.
   const Derivatives &gradient(int rod);
@@ -56,7 +56,7 @@ public:
   }
   /// Derivatives of one rod with another Hessian than the step's; they stay until the rod moves.
   void assembleRod(int rod, HessianKind hessian);
-  const Band &band() const { return derivatives_.band; }
+  const EdgeBlocks &blocks() const { return derivatives_.blocks; }
 
   /// Trial configuration R(iterate, scale x increment) of one rod, with its axial forces; false when impossible.
   bool tryMove(const Planes &increment, double scale, int rod, RetractionKind kind, Configuration &trial);

@@ -15,8 +15,9 @@ enum class Measure { tan, angle };
 
 /// Unknowns of a cell in the order x_{i-1}, theta_{i-1}, x_i, theta_i, x_{i+1}.
 inline constexpr int cell_size = 11;
-/// Entries of the upper triangle of a cell's Hessian, row by row.
-inline constexpr int cell_pairs = cell_size * (cell_size + 1) / 2;
+/// Edge variables of a cell in the order e_{i-1}, theta_{i-1}, e_i, theta_i, of which its energy is a function; entries of the upper triangle of
+/// the Hessian over them, row by row.
+inline constexpr int cell_variables = 8, cell_pairs = cell_variables * (cell_variables + 1) / 2;
 
 /// Constants of one cell; `free[k]` is 1 where frame k belongs to an edge that moves and 0 for the frame of a clamp.
 template <class T> struct CellOf {
@@ -33,7 +34,7 @@ template <class T> struct CellDerivatives {
   std::array<T, cell_pairs> hessian; ///< upper triangle, row by row
 
   void putGradient(int r, const T &v) { gradient[r] = v; }
-  void putHessian(int r, int c, const T &v) { hessian[r * cell_size - r * (r - 1) / 2 + (c - r)] = v; }
+  void putHessian(int r, int c, const T &v) { hessian[r * cell_variables - r * (r - 1) / 2 + (c - r)] = v; }
 };
 
 /// phi(z) = atan(sqrt z)/sqrt z and two derivatives, z = tan^2 of half the turning angle: the factor between the two measures of bending.
@@ -144,8 +145,8 @@ template <Measure measure, class T> std::array<T, cell_size> cellGradient(const 
   return {-e0[0], -e0[1], -e0[2], theta0, e0[0] - e1[0], e0[1] - e1[1], e0[2] - e1[2], theta1, e1[0], e1[1], e1[2]};
 }
 
-/// Gradient and Hessian of a cell's energy, pulled back by the retraction at the current frames: exact and symmetric. Each number goes to `out` once,
-/// by putGradient(r, value) or, for r <= c, putHessian(r, c, value).
+/// Gradient over the unknowns of a cell, and Hessian over its edge variables, pulled back by the retraction at the current frames: exact and symmetric.
+/// Each number goes to `out` once, by putGradient(r, value) or, for r <= c, putHessian(r, c, value).
 template <Measure measure, class T, class Out> void cellDerivatives(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell, Out &&out) {
   const CellGeometry<T> g = cellGeometry(f0, f1, cell);
   const Vector3<T> &t0 = f0.tangent, &t1 = f1.tangent, &b = g.binormal;
@@ -260,46 +261,22 @@ template <Measure measure, class T, class Out> void cellDerivatives(const FrameO
       h[r][4 + c] = h[r][4 + c] + v;
     }
 
-  // From edge vectors to vertices, e0 = x1 - x0, e1 = x2 - x1: first what belongs to the rows of x0 and theta0, then x1 and theta1, then x2. Neighbouring
-  // cells meet in the same memory a slot apart; in this order a store has left the pipeline before a load needs a part of it.
-  auto at = [&](int r, int c) -> const T & { return r <= c ? h[r][c] : h[c][r]; };
-  auto put = [&](int r, int c, const T &v) { out.putHessian(r, c, v); };
-#pragma GCC unroll 3
-  for (int r = 0; r < 3; ++r) {
-    out.putGradient(r, -gradient[r]);
-#pragma GCC unroll 3
-    for (int c = r; c < 3; ++c) put(r, c, h[r][c]);
-    put(r, 3, -h[r][3]);
-#pragma GCC unroll 3
-    for (int c = 0; c < 3; ++c) {
-      put(r, 4 + c, h[r][4 + c] - at(r, c));
-      put(r, 8 + c, -h[r][4 + c]);
-    }
-    put(r, 7, -h[r][7]);
-    put(3, 4 + r, at(3, r) - h[3][4 + r]);
-    put(3, 8 + r, h[3][4 + r]);
+  // First what belongs to the first vertex or edge, then what belongs to the second. Neighbouring cells meet in the same memory a slot apart; in this
+  // order a store has left the pipeline before a load needs a part of it.
+#pragma GCC unroll 4
+  for (int r = 0; r < 4; ++r) {
+    out.putGradient(r, r < 3 ? -gradient[r] : gradient[r]);
+#pragma GCC unroll 8
+    for (int c = r; c < 8; ++c) out.putHessian(r, c, h[r][c]);
   }
-  out.putGradient(3, gradient[3]);
-  put(3, 3, h[3][3]);
-  put(3, 7, h[3][7]);
-#pragma GCC unroll 3
-  for (int r = 0; r < 3; ++r) {
-    out.putGradient(4 + r, gradient[r] - gradient[4 + r]);
-#pragma GCC unroll 3
-    for (int c = r; c < 3; ++c) put(4 + r, 4 + c, h[r][c] - h[r][4 + c] - h[c][4 + r] + h[4 + r][4 + c]);
-    put(4 + r, 7, h[r][7] - h[4 + r][7]);
-#pragma GCC unroll 3
-    for (int c = 0; c < 3; ++c) put(4 + r, 8 + c, h[r][4 + c] - at(4 + r, 4 + c));
-    put(7, 8 + r, h[4 + r][7]);
+#pragma GCC unroll 4
+  for (int r = 0; r < 4; ++r) {
+    out.putGradient(4 + r, r < 3 ? gradient[r] - gradient[4 + r] : gradient[4 + r]);
+#pragma GCC unroll 4
+    for (int c = r; c < 4; ++c) out.putHessian(4 + r, 4 + c, h[4 + r][4 + c]);
   }
-  out.putGradient(7, gradient[7]);
-  put(7, 7, h[7][7]);
 #pragma GCC unroll 3
-  for (int r = 0; r < 3; ++r) {
-    out.putGradient(8 + r, gradient[4 + r]);
-#pragma GCC unroll 3
-    for (int c = r; c < 3; ++c) put(8 + r, 8 + c, h[4 + r][4 + c]);
-  }
+  for (int r = 0; r < 3; ++r) out.putGradient(8 + r, gradient[4 + r]);
 }
 
 } // namespace tendril

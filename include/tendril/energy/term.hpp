@@ -30,12 +30,12 @@ struct Step {
 /// independent axial force; `gradient`, of the potential itself, differs by the forces that stretch adds there.
 struct Derivatives {
   Planes gradient, equilibrium;
-  Band band;
-  explicit Derivatives(int slots) : gradient(slot_size, slots), equilibrium(slot_size, slots), band(slots) {}
+  EdgeBlocks blocks; ///< of the Hessian, over edge variables
+  explicit Derivatives(int slots) : gradient(slot_size, slots), equilibrium(slot_size, slots), blocks(slots) {}
   void setOrigin(int first_slot) {
     gradient.setOrigin(first_slot);
     equilibrium.setOrigin(first_slot);
-    band.setOrigin(first_slot);
+    blocks.setOrigin(first_slot);
   }
 };
 

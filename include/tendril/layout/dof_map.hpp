@@ -7,67 +7,13 @@
 ///                        the frames that clamps hold. Element loops know neither ends nor rings;
 ///   unknowns             of PETSc's global vector: x, y, z and twist of each slot that neither is a copy nor is held by a support.
 
-#include "tendril/geometry/planes.hpp"
+#include "tendril/layout/edge_blocks.hpp"
 #include "tendril/layout/petsc.hpp"
 #include "tendril/model/scene.hpp"
 
 #include <array>
 
 namespace tendril {
-
-/// Numbering of one rod.
-struct RodRange {
-  int first_vertex, vertices;
-  int first_edge, edges;
-  int first_slot; ///< of vertex 0; a multiple of the lanes
-  int slots;      ///< from this rod's first slot to the next rod's
-  bool twist;     ///< false for a cable
-  bool closed;
-
-  int slot(int i) const { return first_slot + i; }
-  int vertexEnd() const { return first_slot + vertices; }
-  int edgeEnd() const { return first_slot + edges; }
-};
-
-/// Rods that follow each other in the scene, [begin, end).
-struct RodSet {
-  int begin, end;
-};
-
-/// Unknowns of a slot: x, y, z, twist.
-inline constexpr int slot_size = 4;
-/// Couplings of an unknown to those after it, itself included: the 11 unknowns of a cell.
-inline constexpr int band_width = cell_size;
-/// Entries of the band in the rows of one slot.
-inline constexpr int slot_entries = slot_size * band_width;
-
-/// Upper band of symmetric matrices of all rods: entry (a, k) of slot s couples unknown a of the slot with the k-th after it. Each of the
-/// 44 entries is a plane over the slots of a rod.
-class Band {
-public:
-  Band() = default;
-  /// Of all rods, or of as many neighbours as so many slots hold.
-  explicit Band(int slots) : data_(std::size_t(slot_entries) * slots + 4 * lanes, 0.0) {}
-  /// Moves the window to the rods from this slot on (see Planes).
-  void setOrigin(int first_slot) { origin_ = first_slot; }
-  double *entry(const RodRange &rod, int a, int k) { return data_.data() + offset(rod, a, k); }
-  const double *entry(const RodRange &rod, int a, int k) const { return data_.data() + offset(rod, a, k); }
-  const double *data() const { return data_.data(); }
-  void clear(const RodRange &rod);
-  /// Becomes other - this.
-  void subtractFrom(const Band &other);
-  /// y += A x for one rod, copies behind a ring included in x and in y.
-  void multiply(const RodRange &rod, const Planes &x, Planes &y) const;
-
-  /// Where the plane of an entry begins in data().
-  std::size_t offset(const RodRange &rod, int a, int k) const {
-    return lanes + std::size_t(slot_entries) * (rod.first_slot - origin_) + std::size_t(a * band_width + k) * rod.slots;
-  }
-
-private:
-  int origin_ = 0;
-  AlignedVector data_;
-};
 
 class DofMap {
 public:
@@ -84,16 +30,15 @@ public:
   Planes makePlanes() const { return Planes(slot_size, slots_); }
 
   DM dm() const { return dm_; }
-  /// Matrix of PETSc's own type over the unknowns, preallocated for the band of every rod.
+  /// Matrix of PETSc's own type over the unknowns, preallocated for the blocks of every rod.
   PetscErrorCode createMatrix(Mat *matrix);
-  /// Puts the band of all rods into the matrix, both triangles.
-  PetscErrorCode fillMatrix(const Band &band, Mat matrix);
+  /// Puts the blocks of all rods into the matrix, both triangles.
+  PetscErrorCode fillMatrix(const EdgeBlocks &blocks, Mat matrix);
 
   /// Copies of the first vertices and edge of a closed rod behind its last.
   void copyBehindRing(const RodRange &rod, Planes &increment) const;
   /// Adds what was summed into the copies behind a ring to the slots they stand for.
   void fold(const RodRange &rod, Planes &sums) const;
-  void fold(const RodRange &rod, Band &band) const;
 
   /// Unknowns of some rods are numbered one after the other.
   PetscInt firstUnknown(RodSet rods) const { return unknown_begin_[rods.begin]; }
@@ -113,7 +58,8 @@ private:
   PetscInt unknowns_ = 0;
   std::vector<bool> held_;
   std::vector<PetscInt> unknown_, unknown_begin_;
-  std::vector<std::size_t> source_; ///< entries of the matrix in its own order: where their value is in the band
+  /// Entries of the matrix in its own order: where their values are in the blocks, those to be taken off as their complement.
+  std::vector<std::ptrdiff_t> source_;
   std::vector<double> entries_;
   OwnedDM dm_;
 

@@ -1,7 +1,10 @@
 #pragma once
 /// \file banded.hpp
-/// LDL^T of the Hessians of chains and rings, without pivoting: the band of a cell, and for a ring the last rows that also meet its first (a
-/// border). The signs of the pivots give the inertia (Sylvester). Rods of the same shape are factored together, one to a lane.
+/// LDL^T of the Hessians of chains and rings, without pivoting, over edge variables. From the last edge to the first, the vector e_i and the twist of
+/// edge i are eliminated from what the rod beyond it stores as a function of the position x_i and of edge i - 1: with x_{i+1} = x_i + e_i no
+/// differences of positions are formed, and a solve keeps its digits however short the edges are (docs/theory.md, Rounding). Unknowns are those of
+/// the vertex coordinates: a change of variables leaves the inertia, which the signs of the pivots give (Sylvester). A ring has its first
+/// vertex and edge as a border. Rods of the same shape are factored together, one to a lane.
 /// Registered with PETSc as the solver type `banded` for Cholesky.
 
 #include "tendril/layout/dof_map.hpp"
@@ -9,24 +12,24 @@
 namespace tendril {
 
 /// Memory for factors. Solvers that work one after the other may share it: a factor is lost when the next is made.
-struct BandedRoom {
-  AlignedVector band, far, rows, copy;
+struct BandedWorkspace {
+  AlignedVector factors, rows, copy;
 };
 
-/// What there is to factor: band + shift x metric of the rods that are wanted.
+/// What there is to factor: blocks + shift x metric (of positions and twists) of the rods that are wanted.
 struct BandedSystem {
   const DofMap *dofs = nullptr;
   RodSet rods{0, 0};
-  const Band *band = nullptr;
+  const EdgeBlocks *blocks = nullptr;
   const Planes *metric = nullptr;
   const std::vector<char> *wanted = nullptr;  ///< per rod of the scene; the others are left out, and a solve gives them zero
   const std::vector<double> *shift = nullptr; ///< per rod of the scene
-  BandedRoom *room = nullptr;
+  BandedWorkspace *workspace = nullptr;
 };
 
 class BandedFactor {
 public:
-  BandedFactor(const DofMap &dofs, RodSet rods, BandedRoom &room);
+  BandedFactor(const DofMap &dofs, RodSet rods, BandedWorkspace &workspace);
 
   void factor(const BandedSystem &system);
   /// By the unknowns of the rods; x may be b.
@@ -45,18 +48,19 @@ private:
     std::array<int, lanes> rod;
     int count;
     bool packed;
-    std::size_t band, far; ///< where its factor begins
+    std::size_t factor; ///< where its factor begins
   };
   const DofMap &dofs_;
   RodSet rods_;
-  std::vector<int> order_;              ///< rods by shape
-  std::vector<std::vector<int>> fixed_; ///< per rod: rows that are held or do not exist
+  std::vector<int> order_;              ///< rods by shape, the held vertices included
+  std::vector<std::vector<char>> held_; ///< per rod and vertex
   std::vector<Group> groups_;
   std::vector<int> negative_, neutral_;
-  BandedRoom &room_;
+  BandedWorkspace &workspace_;
   std::size_t bytes_ = 0;
 
-  void plan(const char *wanted);
+  bool sameShape(int a, int b) const;
+  std::size_t plan(const char *wanted);
   template <class T> void factorGroup(const Group &group, const BandedSystem &system);
   template <class T> void solveGroup(const Group &group, const PetscScalar *b, PetscScalar *x);
 };

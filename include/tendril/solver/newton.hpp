@@ -51,7 +51,7 @@ struct NewtonWork {
   Planes increment, coordinates; ///< work arrays
   Configuration trial;
   Planes motion, metric;
-  BandedRoom room;
+  BandedWorkspace workspace;
 };
 
 /// Solves for some rods that nothing joins to others.

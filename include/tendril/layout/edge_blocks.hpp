@@ -1,0 +1,65 @@
+#pragma once
+/// \file edge_blocks.hpp
+/// Symmetric matrices of all rods, such as the Hessian of the incremental potential, in edge variables: edge vectors e_i = x_{i+1} - x_i, edge
+/// twists, and vertex positions. In vertex coordinates the same matrix has entries of the order EI/h^3 that cancel, and a solve loses digits with
+/// the fourth power of length over edge length; here nothing cancels (docs/theory.md, Rounding).
+
+#include "tendril/layout/rod_range.hpp"
+
+namespace tendril {
+
+/// Variables of an edge: its vector and its twist. Couplings of an edge with itself, upper triangle.
+inline constexpr int edge_size = 4, edge_pairs = edge_size * (edge_size + 1) / 2;
+/// Numbers of a slot: edge i with itself (10), edge i - 1 with edge i (16), the position of vertex i with itself (6).
+inline constexpr int slot_entries = edge_pairs + edge_size * edge_size + 6;
+
+/// The 32 entries of a slot are planes over the slots of a rod. Behind a ring, the copy of its first slot holds what the last edge has with the
+/// first; the other copies are added to what they stand for (fold).
+class EdgeBlocks {
+public:
+  /// Planes of a slot's entries. Edge variables r, c in 0..3: e_x, e_y, e_z, twist.
+  static constexpr int own(int r, int c) { return r * edge_size - r * (r - 1) / 2 + (c - r); } ///< r <= c
+  static constexpr int across(int r, int c) { return edge_pairs + edge_size * r + c; }         ///< r of the edge before, c of the edge
+  static constexpr int vertex(int r, int c) { return edge_pairs + edge_size * edge_size + r * 3 - r * (r - 1) / 2 + (c - r); } ///< r <= c < 3
+
+  EdgeBlocks() = default;
+  /// Of all rods, or of as many neighbours as so many slots hold.
+  explicit EdgeBlocks(int slots) : data_(std::size_t(slot_entries) * slots + 4 * lanes, 0.0) {}
+  /// Moves the window to the rods from this slot on (see Planes).
+  void setOrigin(int first_slot) { origin_ = first_slot; }
+  double *entry(const RodRange &rod, int plane) { return data_.data() + offset(rod, plane); }
+  const double *entry(const RodRange &rod, int plane) const { return data_.data() + offset(rod, plane); }
+  const double *data() const { return data_.data(); }
+  void clear(const RodRange &rod);
+  /// Becomes other - this.
+  void subtractFrom(const EdgeBlocks &other);
+  /// Adds what was summed into the copies behind a ring to the slots they stand for.
+  void fold(const RodRange &rod);
+  /// y += A x for one rod in vertex coordinates (x, y, z, twist of each slot), copies behind a ring included in x and in y.
+  void multiply(const RodRange &rod, const Planes &x, Planes &y) const;
+
+  /// Where the plane of an entry begins in data().
+  std::size_t offset(const RodRange &rod, int plane) const {
+    return lanes + std::size_t(slot_entries) * (rod.first_slot - origin_) + std::size_t(plane) * rod.slots;
+  }
+
+private:
+  int origin_ = 0;
+  AlignedVector data_;
+};
+
+/// The planes of one rod's entries by slot of the scene, for element loops.
+class BlockPlanes {
+public:
+  BlockPlanes(EdgeBlocks &blocks, const RodRange &rod) {
+    for (int k = 0; k < slot_entries; ++k) plane_[k] = blocks.entry(rod, k) - rod.first_slot;
+  }
+  double *own(int r, int c) const { return plane_[EdgeBlocks::own(r, c)]; }
+  double *across(int r, int c) const { return plane_[EdgeBlocks::across(r, c)]; }
+  double *vertex(int r, int c) const { return plane_[EdgeBlocks::vertex(r, c)]; }
+
+private:
+  std::array<double *, slot_entries> plane_;
+};
+
+} // namespace tendril

@@ -1,0 +1,56 @@
+#include "tendril/layout/edge_blocks.hpp"
+
+namespace tendril {
+
+void EdgeBlocks::clear(const RodRange &rod) { std::fill_n(entry(rod, 0) - 1, std::size_t(slot_entries) * rod.slots, 0.0); }
+
+void EdgeBlocks::subtractFrom(const EdgeBlocks &other) {
+  for (std::size_t k = 0; k < data_.size(); ++k) data_[k] = other.data_[k] - data_[k];
+}
+
+/// What the last edge has with the first stays behind the ring.
+void EdgeBlocks::fold(const RodRange &rod) {
+  if (!rod.closed) return;
+  for (int k = 0; k < slot_entries; ++k) {
+    if (k >= edge_pairs && k < across(0, 0) + edge_size * edge_size) continue;
+    double *plane = entry(rod, k);
+    plane[0] += plane[rod.vertices];
+    plane[rod.vertices] = 0;
+  }
+}
+
+void EdgeBlocks::multiply(const RodRange &rod, const Planes &x, Planes &y) const {
+  using Four = std::array<double, edge_size>;
+  auto edge = [&](int i) {
+    Four d{0, 0, 0, x[3][rod.slot(i)]};
+    for (int a = 0; a < 3; ++a) d[a] = x[a][rod.slot(i + 1)] - x[a][rod.slot(i)];
+    return d;
+  };
+  auto add = [&](int i, const Four &force) {
+    for (int a = 0; a < 3; ++a) {
+      y[a][rod.slot(i)] -= force[a];
+      y[a][rod.slot(i + 1)] += force[a];
+    }
+    y[3][rod.slot(i)] += force[3];
+  };
+  auto value = [&](int plane, int i) { return entry(rod, plane)[i]; };
+  for (int i = 0; i < rod.vertices; ++i)
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) y[r][rod.slot(i)] += value(vertex(std::min(r, c), std::max(r, c)), i) * x[c][rod.slot(i)];
+  Four before{};
+  for (int i = 0; i < rod.edges + (rod.closed ? 1 : 0); ++i) {
+    const Four here = edge(i == rod.vertices ? 0 : i);
+    Four force{}, force_before{};
+    for (int r = 0; r < edge_size; ++r)
+      for (int c = 0; c < edge_size; ++c) {
+        if (i < rod.edges) force[r] += value(own(std::min(r, c), std::max(r, c)), i) * here[c];
+        force_before[r] += value(across(r, c), i) * here[c];
+        force[c] += value(across(r, c), i) * before[r];
+      }
+    add(i == rod.vertices ? 0 : i, force);
+    if (i > 0) add(i - 1, force_before);
+    before = here;
+  }
+}
+
+} // namespace tendril
