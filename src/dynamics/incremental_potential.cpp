@@ -10,6 +10,9 @@ namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
+/// Rounding of an edge relative to its length: that of the edge itself, and that of the second word of positions.
+double edgeError(double reach, double edge) { return epsilon * (1 + epsilon * reach / edge); }
+
 /// Loads on each rod [N]: its weight and the forces and couples on it.
 std::vector<double> loads(const Scene &scene, const std::vector<double> &length) {
   std::vector<double> load;
@@ -69,7 +72,7 @@ void IncrementalPotential::beginStep(const State &start, const Step &step) {
 void IncrementalPotential::beginRod(const State &start, int r) {
   setRod(start, elements_, r, start_);
   iterate_.copyRod(elements_, r, start_);
-  if (step_.rule) carryFrames(*step_.rule, start, elements_, r, start_, reference_);
+  if (step_.rule) carryFrames(*step_.rule, elements_, r, start_, reference_);
   axial_.beginStep(start_, step_, r);
   for (auto &term : terms_) term->beginStep(start, start_, step_, r);
   followSupports(r);
@@ -155,7 +158,7 @@ bool IncrementalPotential::remainingMotion(RodSet rods, Planes &increment) const
     const RodRange &rod = elements_.rods[s.rod];
     const int slot = rod.slot(s.vertex);
     const Vec3 target = scene_.rods[s.rod].position[s.vertex] + s.motion.displacementAt(step_.time);
-    Vec3 d = target - iterate_.positionAt(slot);
+    Vec3 d = (target - iterate_.positionAt(slot)) - iterate_.values().vector(C::position_low, slot);
     if (d.norm() <= 4 * epsilon * target.norm()) d.setZero();
     any = any || !d.isZero(0);
     increment.setVector(0, slot, d);
@@ -191,20 +194,20 @@ double IncrementalPotential::steepnessOf(const Configuration &c, int r) const {
   return 1 / std::max(flattest * flattest, epsilon);
 }
 
-/// Coordinates carry an error of epsilon x reach, which is a strain of delta = epsilon reach / h in an edge of length h and an angle as large in
-/// a cell: each costs (force + stiffness delta) delta of energy. On top of it comes the rounding of the sums.
+/// Edges carry an error of delta = epsilon in their length and direction: each costs (force + stiffness delta) delta of energy per length. On top of it
+/// comes the rounding of the sums.
 IncrementalPotential::RodEnergy IncrementalPotential::rodEnergy(const Configuration &c, int r) const {
   using std::abs;
   const RodRange &rod = elements_.rods[r];
-  const double reach = reachOf(c, rod), steepness = steepnessOf(c, r), blur = epsilon * reach;
+  const double reach = reachOf(c, rod), steepness = steepnessOf(c, r), blur = edgeError(reach, shortest_[r]);
   Pack stretching(0.0);
   for (int i = rod.first_slot; i < rod.edgeEnd(); i += lanes) {
-    const Pack stiffness = read<Pack>(axial_.stiffness() + i), delta = Pack(blur) * read<Pack>(elements_.inverseRestLength() + i);
+    const Pack stiffness = read<Pack>(axial_.stiffness() + i);
     const Pack force = stiffness * abs(read<Pack>(c[C::strain] + i) - read<Pack>(axial_.rest() + i));
-    stretching += (force + stiffness * delta) * Pack(blur);
+    stretching += (force + stiffness * Pack(blur)) * (Pack(blur) * read<Pack>(elements_.restLength() + i));
   }
   // Edge, length, tangent and binormal each round.
-  const double delta = 4 * blur / shortest_cell_[r], bending = bending_[r] * steepness;
+  const double delta = 4 * blur, bending = bending_[r] * steepness;
   RodEnergy result{0, reduce(stretching), reach, steepness};
   for (const auto &term : terms_) {
     const double energy = term->energy(c, r);
@@ -313,7 +316,8 @@ void IncrementalPotential::coordinates(Planes &x, RodSet rods) const {
     const RodRange &rod = elements_.rods[r];
     for (int a = 0; a < 3; ++a) {
       const double *now = iterate_[C::Plane(C::position + a)], *before = start_[C::Plane(C::position + a)];
-      for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) x[a][s] = now[s] - before[s];
+      const double *low = iterate_[C::Plane(C::position_low + a)], *low_before = start_[C::Plane(C::position_low + a)];
+      for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) x[a][s] = (now[s] - before[s]) + (low[s] - low_before[s]);
     }
     if (rod.twist) std::copy(iterate_[C::spin] + rod.first_slot, iterate_[C::spin] + rod.edgeEnd(), x[3] + rod.first_slot);
   }
@@ -354,8 +358,8 @@ IncrementalPotential::Residual IncrementalPotential::residual(int r, const RodEn
     error = max(error, select(live, Pack(abs(strain - force / read<Pack>(axial_.stiffness() + s))), Pack(0.0)));
   }
   const double force = reduce(forces), moment = reduce(moments);
-  // Coordinates carry an error of epsilon x reach: strains of epsilon reach/h, which the stiffnesses turn into forces and moments.
-  const double strain_noise = epsilon * energy.reach / shortest_[r], count = std::sqrt(double(rod.vertices));
+  // Edges carry errors of epsilon in their strains and directions, which the stiffnesses turn into forces and moments.
+  const double strain_noise = edgeError(energy.reach, shortest_[r]), count = std::sqrt(double(rod.vertices));
   const double bending = energy.steepness * std::max({m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness}) / shortest_[r];
   const double scale = force_scale_[r], stretching = step_.mixed ? hmax(tension) : hmax(tension) + m.axial_stiffness;
   Residual result;
@@ -391,7 +395,7 @@ IncrementalPotential::Residual IncrementalPotential::residual() {
   for (const RodRange &rod : elements_.rods) {
     for (int i = 0; i < rod.vertices; ++i) {
       const int v = rod.first_vertex + i;
-      const Vec3 d = iterate_.positionAt(rod.slot(i)) - start_.positionAt(rod.slot(i)), velocity = d * rate + rule.velocity.atVertex(v);
+      const Vec3 d = iterate_.displacementAt(rod.slot(i), start_), velocity = d * rate + rule.velocity.atVertex(v);
       rates.displacement.vertex[v] = d;
       rates.velocity.vertex[v] = velocity;
       rates.acceleration.vertex[v] = (rule.mass * velocity + rule.acceleration.atVertex(v)) * rate;
@@ -421,7 +425,7 @@ bool IncrementalPotential::moveOn(double time) {
   turnSupports(iterate_, middle);
   for (int r = 0; r < all().end; ++r) {
     const RodRange &rod = elements_.rods[r];
-    for (int i = 0; i < rod.vertices; ++i) increment.setVector(0, rod.slot(i), iterate_.positionAt(rod.slot(i)) - start_.positionAt(rod.slot(i)));
+    for (int i = 0; i < rod.vertices; ++i) increment.setVector(0, rod.slot(i), iterate_.displacementAt(rod.slot(i), start_));
     for (int i = 0; rod.twist && i < rod.edges; i += lanes) {
       const Pack spun = spinOver(twistReference(), iterate_, rod.slot(i));
       for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) increment[3][rod.slot(i + l)] = spun[l];
@@ -443,7 +447,7 @@ void IncrementalPotential::commit(State &state, RodSet rods) const {
   for (int r = rods.begin; r < rods.end && !step_.isStatic(); ++r) {
     const RodRange &rod = elements_.rods[r];
     const double rate = 1 / step_.dt;
-    for (int i = 0; i < rod.vertices; ++i) state.velocity[rod.first_vertex + i] = (iterate_.positionAt(rod.slot(i)) - start_.positionAt(rod.slot(i))) * rate;
+    for (int i = 0; i < rod.vertices; ++i) state.velocity[rod.first_vertex + i] = iterate_.displacementAt(rod.slot(i), start_) * rate;
     for (int i = 0; i < rod.edges; i += lanes) {
       const Pack spun = spinOver(start_, iterate_, rod.slot(i)) * Pack(rate);
       for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) state.twist_rate[rod.first_edge + i + l] = spun[l];
@@ -456,7 +460,10 @@ void IncrementalPotential::commit(State &state, RodSet rods) const {
   for (int r = rods.begin; r < rods.end; ++r) {
     const RodRange &rod = elements_.rods[r];
     for (int n = elements_.rod_cells[r]; n < elements_.rod_cells[r + 1]; ++n) state.turns[n] = iterate_[C::turns][elements_.cell_slot[n]];
-    for (int i = 0; i < rod.vertices; ++i) state.position[rod.first_vertex + i] = iterate_.positionAt(rod.slot(i));
+    for (int i = 0; i < rod.vertices; ++i) {
+      state.position[rod.first_vertex + i] = iterate_.positionAt(rod.slot(i));
+      state.position_low[rod.first_vertex + i] = iterate_.values().vector(C::position_low, rod.slot(i));
+    }
     for (int i = 0; i < rod.edges; i += lanes) {
       const int slot = rod.slot(i), live = std::min(lanes, rod.edges - i);
       const FrameOf<Pack> f = iterate_.frames<Pack>(slot);

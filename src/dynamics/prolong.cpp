@@ -95,6 +95,7 @@ State prolonged(const State &state, const Scene &scene, const Elements &elements
       }
     }
   }
+  out.position_low.assign(out.position.size(), Vec3::Zero());
   out.velocity.assign(out.position.size(), Vec3::Zero());
   out.twist_rate.assign(out.director.size(), 0.0);
   out.turns.assign(fine_elements.cell_slot.size(), 0.0);

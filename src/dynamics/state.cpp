@@ -36,7 +36,7 @@ void Configuration::copyRod(const Elements &elements, int r, const Configuration
 void Configuration::closeRing(const RodRange &rod) {
   if (!rod.closed) return;
   const int behind = rod.vertexEnd();
-  for (const int i : {0, 1}) values_.setVector(position, behind + i, positionAt(rod.slot(i)));
+  for (const int i : {0, 1}) setPosition(behind + i, positionAt(rod.slot(i)), values_.vector(position_low, rod.slot(i)));
   setFrame(behind, frameAt(rod.slot(0)));
   for (const Plane p : {strain, spin, axial_force}) values_[p][behind] = values_[p][rod.slot(0)];
 }
@@ -55,6 +55,7 @@ State initialState(const Scene &scene, const Elements &elements) {
     }
     s.velocity.insert(s.velocity.end(), rod.position.size(), rod.initial_velocity);
   }
+  s.position_low.assign(s.position.size(), Vec3::Zero());
   s.twist_rate.assign(s.director.size(), 0.0);
   s.axial_force.assign(s.director.size(), 0.0);
   s.turns.assign(elements.cell_slot.size(), 0.0);
@@ -89,8 +90,7 @@ void setSupports(const Scene &scene, const Elements &elements, double motion_tim
   using std::sqrt;
   const RodRange &rod = elements.rods[r];
   for (int n = elements.rod_cells[r]; n < elements.rod_cells[r + 1]; ++n) c[C::turns][elements.cell_slot[n]] = state.turns[n];
-  for (int i = 0; i < rod.vertices; ++i)
-    for (int a = 0; a < 3; ++a) c[C::Plane(C::position + a)][rod.slot(i)] = state.position[rod.first_vertex + i][a];
+  for (int i = 0; i < rod.vertices; ++i) c.setPosition(rod.slot(i), state.position[rod.first_vertex + i], state.position_low[rod.first_vertex + i]);
   c.closeRing(rod);
   for (int i = 0; i < rod.edges; ++i) {
     for (int a = 0; a < 3; ++a) c[C::Plane(C::director + a)][rod.slot(i)] = state.director[rod.first_edge + i][a];
@@ -99,7 +99,7 @@ void setSupports(const Scene &scene, const Elements &elements, double motion_tim
   }
   for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
     const Pack::mask_type live = firstLanes(rod.edgeEnd() - s);
-    const Vector3<Pack> e = c.positions<Pack>(s + 1) - c.positions<Pack>(s);
+    const Vector3<Pack> e = c.edges<Pack>(s);
     const Pack l = sqrt(e.squaredNorm()), length = select(live, l, read<Pack>(c[C::length] + s));
     for (int a = 0; a < 3; ++a) {
       double *t = c[C::Plane(C::tangent + a)] + s;
@@ -115,17 +115,17 @@ void setSupports(const Scene &scene, const Elements &elements, double motion_tim
   });
 }
 
-void carryFrames(const StageRule &rule, const State &start, const Elements &elements, int r, const Configuration &from, Configuration &reference) {
+void carryFrames(const StageRule &rule, const Elements &elements, int r, const Configuration &from, Configuration &reference) {
   const RodRange &rod = elements.rods[r];
   reference.copyRod(elements, r, from);
-  auto place = [&](int i) {
+  auto moved = [&](int i) {
     const int v = rod.first_vertex + (i == rod.vertices ? 0 : i);
-    return Vec3(start.position[v] + elements.freedom()[elements.vertex_slot[v]] * rule.guess.atVertex(v));
+    return Vec3(elements.freedom()[elements.vertex_slot[v]] * rule.guess.atVertex(v));
   };
-  Vec3 here = place(0);
+  Vec3 here = moved(0);
   for (int i = 0; rod.twist && i < rod.edges; ++i) {
-    const Vec3 next = place(i + 1), edge = next - here;
     const Frame f = from.frameAt(rod.slot(i));
+    const Vec3 next = moved(i + 1), edge = f.tangent * f.length + (next - here);
     const Vec3 tangent = edge.normalized();
     if (f.tangent.dot(tangent) > 0.1)
       reference.setFrame(rod.slot(i), {tangent, orthonormalised(transport<double>(f.director, f.tangent, tangent), tangent), f.length});

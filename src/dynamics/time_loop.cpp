@@ -93,7 +93,7 @@ TimeLoop::StepError TimeLoop::stepError(const State &start, double h) const {
     for (int v = rod.first_vertex; v < rod.first_vertex + rod.vertices; ++v) {
       if (potential.elements().freedom()[potential.elements().vertex_slot[v]] == 0) continue;
       wrong += error.atVertex(v).squaredNorm();
-      moved += (potential.iterate().positionAt(potential.elements().vertex_slot[v]) - start.position[v]).squaredNorm();
+      moved += potential.iterate().displacementAt(potential.elements().vertex_slot[v], potential.start()).squaredNorm();
     }
     for (int e = rod.first_edge; rod.twist && e < rod.first_edge + rod.edges; ++e) {
       turned_wrong += std::pow(error.atEdge(e), 2);

@@ -13,7 +13,8 @@ public:
   /// With v = d/dt + u and acceleration (mass v + b)/dt (StageRule), inertia and dissipation are m (mass/dt^2 + alpha/dt) (d - d_hat),
   /// d_hat = -dt u - b dt/(mass + alpha dt); the same for the twist increment. Backward Euler has mass 1, u = 0 and b = -v_n.
   void beginStep(const State &state, const Configuration &start, const Step &step, int r) override {
-    start_ = step.twist_reference ? step.twist_reference : &start;
+    start_ = &start;
+    reference_ = step.twist_reference ? step.twist_reference : &start;
     const RodRange &rod = elements_.rods[r];
     const double alpha = scene_.rods[r].material.mass_damping_coefficient;
     const double mass = step.rule ? step.rule->mass : 1;
@@ -22,7 +23,7 @@ public:
     if (step.rule) {
       for (int i = 0; i < rod.vertices; ++i) {
         const int v = rod.first_vertex + i;
-        predicted_.setVector(0, rod.slot(i), state.position[v] - step.dt * step.rule->velocity.atVertex(v) - reach * step.rule->acceleration.atVertex(v));
+        predicted_.setVector(0, rod.slot(i), -step.dt * step.rule->velocity.atVertex(v) - reach * step.rule->acceleration.atVertex(v));
       }
       for (int i = 0; i < rod.edges; ++i) {
         const int e = rod.first_edge + i;
@@ -31,7 +32,7 @@ public:
       return;
     }
     for (int i = 0; i < rod.vertices; ++i)
-      for (int a = 0; a < 3; ++a) predicted_[a][rod.slot(i)] = state.position[rod.first_vertex + i][a] + reach * state.velocity[rod.first_vertex + i][a];
+      for (int a = 0; a < 3; ++a) predicted_[a][rod.slot(i)] = reach * state.velocity[rod.first_vertex + i][a];
     for (int i = 0; i < rod.edges; ++i) predicted_[3][rod.slot(i)] = reach * state.twist_rate[rod.first_edge + i];
   }
 
@@ -39,10 +40,10 @@ public:
     const RodRange &rod = elements_.rods[r];
     Pack total(0.0);
     for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes)
-      total += read<Pack>(elements_.mass() + s) * (c.positions<Pack>(s) - readVector<Pack>(predicted_, 0, s)).squaredNorm();
+      total += read<Pack>(elements_.mass() + s) * (c.displacements<Pack>(s, *start_) - readVector<Pack>(predicted_, 0, s)).squaredNorm();
     if (rod.twist)
       for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
-        const Pack d = spinOver(*start_, c, s) - read<Pack>(predicted_[3] + s);
+        const Pack d = spinOver(*reference_, c, s) - read<Pack>(predicted_[3] + s);
         total += read<Pack>(elements_.twistMass() + s) * d * d;
       }
     return 0.5 * weight_[r] * reduce(total);
@@ -53,15 +54,16 @@ public:
     const BlockPlanes blocks(out.blocks, rod);
     for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) {
       const Pack w = read<Pack>(elements_.mass() + s) * Pack(weight_[r]);
+      const Vector3<Pack> d = c.displacements<Pack>(s, *start_);
       for (int a = 0; a < 3; ++a) {
-        addTo<Pack>(out.equilibrium[a] + s, w * (read<Pack>(c[Configuration::Plane(Configuration::position + a)] + s) - read<Pack>(predicted_[a] + s)));
+        addTo<Pack>(out.equilibrium[a] + s, w * (d[a] - read<Pack>(predicted_[a] + s)));
         if (hessian != HessianKind::none) addTo(blocks.vertex(a, a) + s, w);
       }
     }
     if (!rod.twist) return;
     for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
-      const Pack difference = spinOver(*start_, c, s) - read<Pack>(predicted_[3] + s);
-      const auto d = twistInertia<Pack>(start_->frames<Pack>(s), c.frames<Pack>(s), Pack(weight_[r]) * read<Pack>(elements_.twistMass() + s), difference);
+      const Pack difference = spinOver(*reference_, c, s) - read<Pack>(predicted_[3] + s);
+      const auto d = twistInertia<Pack>(reference_->frames<Pack>(s), c.frames<Pack>(s), Pack(weight_[r]) * read<Pack>(elements_.twistMass() + s), difference);
       // What belongs to the first vertex of the edges before what belongs to the second, whose memory overlaps (see cellDerivatives).
       addTo(out.equilibrium[3] + s, d.gradient[3]);
       for (int a = 0; a < 3; ++a) addTo<Pack>(out.equilibrium[a] + s, -d.gradient[a]);
@@ -76,8 +78,8 @@ public:
 private:
   const Scene &scene_;
   const Elements &elements_;
-  const Configuration *start_ = nullptr; ///< twist is measured from its frames
-  Planes predicted_;                     ///< positions, and twists since the start
+  const Configuration *start_ = nullptr, *reference_ = nullptr; ///< what displacements, and what twists are measured from
+  Planes predicted_;                                            ///< displacements and twists
   std::vector<double> weight_;
 };
 

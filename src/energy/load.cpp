@@ -44,7 +44,7 @@ public:
   double energy(const Configuration &c, int r) const override {
     const RodRange &rod = elements_.rods[r];
     Pack work(0.0);
-    for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) work += readVector<Pack>(force_, 0, s).dot(c.positions<Pack>(s) - start_->positions<Pack>(s));
+    for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) work += readVector<Pack>(force_, 0, s).dot(c.displacements<Pack>(s, *start_));
     double sum = -reduce(work);
     if (turns_) {
       Pack centrifugal(0.0);

@@ -12,6 +12,7 @@ namespace {
 /// Applies `visit(name, values, columns)` to every array of a state: one list for writing and reading.
 template <class AnyState, class Visit> void eachArray(AnyState &s, Visit visit) {
   visit("position", s.position, 3);
+  visit("position_low", s.position_low, 3);
   visit("director", s.director, 3);
   visit("velocity", s.velocity, 3);
   visit("twist_rate", s.twist_rate, 1);

@@ -41,8 +41,12 @@ void Retraction::setInverseTimeSquared(double value) {
 bool Retraction::apply(const C &from, const Planes &increment, double scale, int r, RetractionKind kind, C &to) {
   const RodRange &rod = elements_.rods[r];
   for (int a = 0; a < 3; ++a)
-    for (int s = rod.first_slot; s < rod.vertexEnd() + (rod.closed ? 2 : 0); s += lanes)
-      write(to[C::Plane(C::position + a)] + s, Pack(read<Pack>(from[C::Plane(C::position + a)] + s) + Pack(scale) * read<Pack>(increment[a] + s)));
+    for (int s = rod.first_slot; s < rod.vertexEnd() + (rod.closed ? 2 : 0); s += lanes) {
+      Pack high = read<Pack>(from[C::Plane(C::position + a)] + s), low = read<Pack>(from[C::Plane(C::position_low + a)] + s);
+      addTwoWords(high, low, Pack(Pack(scale) * read<Pack>(increment[a] + s)));
+      write(to[C::Plane(C::position + a)] + s, high);
+      write(to[C::Plane(C::position_low + a)] + s, low);
+    }
   if (kind != RetractionKind::additive && !restoreLengths(from, r, kind, to)) return false;
   return updateFrames(from, increment, scale, r, to);
 }
@@ -53,7 +57,7 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
   const RodRange &rod = elements_.rods[r];
   double *wanted = work_[target];
   for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
-    const Vector3<Pack> edge = to.positions<Pack>(s + 1) - to.positions<Pack>(s); // e + scale de
+    const Vector3<Pack> edge = to.edges<Pack>(s); // e + scale de
     const FrameOf<Pack> before = from.frames<Pack>(s);
     Pack want = before.tangent.dot(edge);
     if (kind == RetractionKind::continued) want -= (edge - before.tangent * before.length).squaredNorm() / (Pack(2.0) * before.length);
@@ -63,9 +67,10 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
     write(wanted + s, want);
     writeVector<Pack>(work_, direction, s, edge / length);
   }
-  std::array<double *, 3> x, d;
+  std::array<double *, 3> x, low, d;
   for (int a = 0; a < 3; ++a) {
     x[a] = to[C::Plane(C::position + a)];
+    low[a] = to[C::Plane(C::position_low + a)];
     d[a] = work_[direction + a];
   }
   if (rod.closed) {
@@ -73,7 +78,20 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
     return true;
   }
   auto step = [&](int at, int edge, int next, double sign) {
-    for (int a = 0; a < 3; ++a) x[a][next] = x[a][at] + sign * wanted[edge] * d[a][edge];
+    for (int a = 0; a < 3; ++a) { // as addTwoWords, but the words are put in order later, off the chain of dependencies
+      const double e = sign * wanted[edge] * d[a][edge], sum = x[a][at] + e, added = sum - x[a][at];
+      low[a][next] = low[a][at] + ((x[a][at] - (sum - added)) + (e - added));
+      x[a][next] = sum;
+    }
+  };
+  auto moveAll = [&](const Vec3 &by) {
+    for (int a = 0; a < 3; ++a)
+      for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) {
+        Pack high = read<Pack>(x[a] + s), rest = read<Pack>(low[a] + s);
+        addTwoWords(high, rest, Pack(by[a]));
+        write(x[a] + s, high);
+        write(low[a] + s, rest);
+      }
   };
   const double *freedom = elements_.freedom();
   int first = -1, last = -1; // held vertices of the rod
@@ -87,19 +105,18 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
     Vec3 before = Vec3::Zero(), after = Vec3::Zero();
     double total = 0;
     auto mean = [&](Vec3 &sum) {
-      for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) sum += mass[s] * to.positionAt(s);
+      for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) sum += mass[s] * to.displacementAt(s, from);
     };
     mean(before);
     for (int s = rod.first_slot; s < rod.edgeEnd(); ++s) step(s, s, s + 1, 1);
     mean(after);
     for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) total += mass[s];
-    if (total > 0)
-      for (int a = 0; a < 3; ++a)
-        for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) x[a][s] += (before[a] - after[a]) / total;
+    moveAll(total > 0 ? Vec3((before - after) / total) : Vec3::Zero());
     return true;
   }
   for (int s = first; s > rod.first_slot; --s) step(s, s - 1, s - 1, -1);
   for (int s = last; s + 1 < rod.vertexEnd(); ++s) step(s, s, s + 1, 1);
+  moveAll(Vec3::Zero());
   for (int s = first; s < last;) {
     int end = s + 1;
     while (freedom[end] != 0) ++end;
@@ -123,7 +140,7 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
     }
     for (int s = first; s < last; s += lanes) {
       const Pack::mask_type live = firstLanes(last - s);
-      const Vector3<Pack> e = to.positions<Pack>(s + 1) - to.positions<Pack>(s);
+      const Vector3<Pack> e = to.edges<Pack>(s);
       const Pack length = sqrt(e.squaredNorm());
       for (int a = 0; a < 3; ++a) write(work_[direction + a] + s, select(live, Pack(e[a] / length), Pack(0.0)));
       write(rhs + s, select(live, Pack(length - read<Pack>(work_[target] + s)), Pack(0.0)));
@@ -155,11 +172,11 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
       for (int s = first; s < last; ++s) rhs[s] -= factor * z[s];
     }
     for (int a = 0; a < 3; ++a) {
-      double *x = to[C::Plane(C::position + a)], *d = work_[direction + a];
+      double *x = to[C::Plane(C::position + a)], *low = to[C::Plane(C::position_low + a)], *d = work_[direction + a];
       for (int s = first; s < last; ++s) d[s] *= rhs[s];
-      for (int s = last - 1; s > first; --s) x[s] += soft[s] * (d[s] - d[s - 1]);
-      x[first] += soft[first] * (d[first] - (rod.closed ? d[end] : 0.0));
-      if (!rod.closed) x[last] -= soft[last] * d[end];
+      for (int s = last - 1; s > first; --s) addTwoWords(x[s], low[s], soft[s] * (d[s] - d[s - 1]));
+      addTwoWords(x[first], low[first], soft[first] * (d[first] - (rod.closed ? d[end] : 0.0)));
+      if (!rod.closed) addTwoWords(x[last], low[last], -soft[last] * d[end]);
     }
   }
   if (rod.closed) to.closeRing(rod);
@@ -170,7 +187,7 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
   const RodRange &rod = elements_.rods[r];
   for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
     const Pack::mask_type live = firstLanes(rod.edgeEnd() - s);
-    const Vector3<Pack> e = to.positions<Pack>(s + 1) - to.positions<Pack>(s);
+    const Vector3<Pack> e = to.edges<Pack>(s);
     const Pack length = sqrt(e.squaredNorm());
     const FrameOf<Pack> f = from.frames<Pack>(s);
     const Vector3<Pack> t = e / length;

@@ -54,7 +54,7 @@ struct StageRule {
 
 /// Frames of a rod from which a stage measures twist: those of the start, carried to where the guess leads. Twist inertia then acts on positions by
 /// the small turn from there; from the start itself, that would be an error of first order in the step.
-void carryFrames(const StageRule &rule, const State &start, const Elements &elements, int rod, const Configuration &from, Configuration &reference);
+void carryFrames(const StageRule &rule, const Elements &elements, int rod, const Configuration &from, Configuration &reference);
 
 /// What a stage found.
 struct StageRates {

@@ -20,6 +20,7 @@ struct State {
   double time = 0;
   std::int64_t step = 0;
   std::vector<Vec3> position;      ///< (nv) [m]
+  std::vector<Vec3> position_low;  ///< (nv) what rounding to `position` has left of it; edges are differences of both words [m]
   std::vector<Vec3> director;      ///< (ne) first directors
   std::vector<Vec3> velocity;      ///< (nv) [m/s]
   std::vector<double> twist_rate;  ///< (ne) [rad/s]
@@ -50,7 +51,9 @@ public:
     turns = 12, ///< of cells, as in State
     twist = 13, ///< twist angle of cells with whole turns [rad]
     axial_force = 14,
-    planes = 15
+    /// Second word of the position: edges and displacements are known to rounding of their own size, not to that of the coordinates.
+    position_low = 15,
+    planes = 18
   };
 
   Configuration() = default;
@@ -67,6 +70,18 @@ public:
     return {readVector<T>(values_, tangent, slot), readVector<T>(values_, director, slot), read<T>((*this)[length] + slot)};
   }
   template <class T> Vector3<T> positions(int slot) const { return readVector<T>(values_, position, slot); }
+  /// Edge vectors x_{i+1} - x_i.
+  template <class T> Vector3<T> edges(int slot) const { return displacements<T>(slot + 1, *this, slot); }
+  /// Displacements from the slot of another configuration.
+  template <class T> Vector3<T> displacements(int slot, const Configuration &from, int from_slot) const {
+    return (positions<T>(slot) - from.positions<T>(from_slot)) + (readVector<T>(values_, position_low, slot) - readVector<T>(from.values_, position_low, from_slot));
+  }
+  template <class T> Vector3<T> displacements(int slot, const Configuration &from) const { return displacements<T>(slot, from, slot); }
+  Vec3 displacementAt(int slot, const Configuration &from) const { return displacements<double>(slot, from); }
+  void setPosition(int slot, const Vec3 &high, const Vec3 &low) {
+    values_.setVector(position, slot, high);
+    values_.setVector(position_low, slot, low);
+  }
 
   /// Copies all of one rod, the frames of its ends and its loose cells included.
   void copyRod(const Elements &elements, int rod, const Configuration &from);

@@ -47,6 +47,14 @@ inline void write(double *p, double v) { *p = v; }
 inline void write(double *p, const Pack &v) { v.copy_to(p, std::experimental::element_aligned); }
 template <class T> void addTo(double *p, const T &v) { write(p, read<T>(p) + v); }
 
+/// Adds `d` to the unevaluated sum high + low, of which `high` stays the rounded value (TwoSum: Knuth, The Art of Computer Programming 2, 4.2.2).
+template <class T> void addTwoWords(T &high, T &low, const T &d) {
+  const T sum = high + d, added = sum - high;
+  const T rest = low + ((high - (sum - added)) + (d - added));
+  high = sum + rest;
+  low = rest - (high - sum);
+}
+
 /// Lanes below `count`.
 inline Pack::mask_type firstLanes(int count) { return Pack([](auto lane) { return double(lane); }) < Pack(double(count)); }
 
