@@ -107,13 +107,15 @@ PetscErrorCode ArcLength::iterate(const std::function<double(const Point &moved,
   PetscReal rtol;
   PetscCall(SNESGetTolerances(solver_.snes(), nullptr, &rtol, nullptr, nullptr, nullptr));
   *converged = false;
+  double last = HUGE_VAL, moved_by = 0; // by the last correction, and by all since the start of the step
   for (int k = 0; k <= most_iterations; ++k) {
     const IncrementalPotential::Residual residual = potential.residual();
     if (!std::isfinite(residual.force) || !std::isfinite(residual.moment)) {
       obstacle_ = "the forces are not finite";
       PetscFunctionReturn(0);
     }
-    *converged = k > 0 && isSmall(residual, rtol);
+    // Rounding may keep the residual above its tolerance: then what the last correction moved must be little.
+    *converged = k > 0 && (excess(residual, rtol) <= 1 || (isAtNoise(residual, rtol) && last <= potential.rounding_tolerance * moved_by));
     if (*converged) PetscFunctionReturn(0);
     if (k == most_iterations) break;
     int negative;
@@ -130,6 +132,9 @@ PetscErrorCode ArcLength::iterate(const std::function<double(const Point &moved,
     PetscCall(solveLoad(&load.unknowns));
     const double change = constraint(moved, correction, load);
     for (std::size_t k = 0; k < metric_.size(); ++k) correction.unknowns.data()[k] += change * load.unknowns.data()[k];
+    correction.factor = change;
+    last = std::sqrt(product(correction, correction));
+    moved_by = std::sqrt(product(moved, moved));
     ++iterations_;
     if (!move(correction.unknowns, potential.step().load_factor + change)) {
       obstacle_ = "an edge vanishes or turns back on itself";

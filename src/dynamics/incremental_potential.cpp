@@ -208,10 +208,11 @@ IncrementalPotential::RodEnergy IncrementalPotential::rodEnergy(const Configurat
   }
   // Edge, length, tangent and binormal each round.
   const double delta = 4 * blur, bending = bending_[r] * steepness;
-  RodEnergy result{0, reduce(stretching), reach, steepness};
+  RodEnergy result{0, reduce(stretching), 0, reach, steepness};
   for (const auto &term : terms_) {
     const double energy = term->energy(c, r);
     result.value += energy;
+    result.size += std::abs(energy);
     result.noise += 64 * epsilon * std::abs(energy) + delta * (std::sqrt(2 * std::abs(energy) * bending) + bending * delta);
   }
   if (!std::isfinite(result.value)) result = {};
@@ -255,6 +256,12 @@ const Derivatives &IncrementalPotential::derivatives(RodSet rods) {
   for (int r = rods.begin; r < rods.end; ++r)
     if (known_[r] != Known::all) assembleRod(r, step_.hessian);
   return derivatives_;
+}
+
+void IncrementalPotential::addLoads(int r, Derivatives &out) const {
+  for (const auto &term : terms_)
+    if (term->isLoad()) term->addDerivatives(iterate_, r, out, HessianKind::none);
+  dofs_.fold(elements_.rods[r], out.equilibrium);
 }
 
 const Derivatives &IncrementalPotential::gradient(int r) {
@@ -367,7 +374,8 @@ IncrementalPotential::Residual IncrementalPotential::residual(int r, const RodEn
   result.moment = std::sqrt(moment) / (scale * length_[r]);
   result.compatibility = step_.mixed ? hmax(error) : 0;
   // Inertia turns an error of position or twist into a force or a moment, which counts in short steps.
-  const double inertia = step_.isStatic() ? 0 : longest_[r] / (step_.dt * step_.dt), heavy = m.linear_density * shortest_[r] * inertia, spinning = m.linear_rotational_inertia * inertia;
+  const double inertia = step_.isStatic() ? 0 : longest_[r] / (step_.dt * step_.dt), heavy = m.linear_density * shortest_[r] * inertia,
+               spinning = m.linear_rotational_inertia * inertia;
   result.force_floor = 4 * count * strain_noise * (stretching + heavy + (m.isCable() ? 0 : bending / shortest_[r])) / scale;
   if (!m.isCable()) result.moment_floor = 4 * count * strain_noise * (bending + spinning) / (scale * length_[r]);
   result.compatibility_floor = 16 * strain_noise;
@@ -375,7 +383,8 @@ IncrementalPotential::Residual IncrementalPotential::residual(int r, const RodEn
 }
 
 void IncrementalPotential::Residual::include(const Residual &other) {
-  for (double Residual::*part : {&Residual::force, &Residual::moment, &Residual::compatibility, &Residual::force_floor, &Residual::moment_floor, &Residual::compatibility_floor})
+  for (double Residual::*part :
+       {&Residual::force, &Residual::moment, &Residual::compatibility, &Residual::force_floor, &Residual::moment_floor, &Residual::compatibility_floor})
     if (other.*part > this->*part || std::isnan(other.*part)) this->*part = other.*part;
 }
 

@@ -203,7 +203,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
       in_vain += report.iterations;
       good = 0;
       dt = 0.5 * h;
-      if (dt >= std::min(dt_min, (settings_.t_end - state.time) / 1024)) continue; // a short last step may be halved as often
+      if (!report.lost && dt >= std::min(dt_min, (settings_.t_end - state.time) / 1024)) continue; // a short last step may be halved as often
       std::ostringstream message;
       message << (settings_.dynamic ? "step at time " : "load step at factor ") << state.time << " failed with " << (settings_.dynamic ? "dt " : "increment ")
               << h << ": " << report.reason << " (" << report.iterations << " iterations; residual " << report.residual.force << " of the load, "
@@ -232,6 +232,8 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     PetscCall(PetscTime(&now));
     row.wall_seconds = now - begin;
     row.error_estimate = control.error_sum;
+    control.rounding_sum = settings_.dynamic ? control.rounding_sum + report.rounding_error : report.rounding_error;
+    row.rounding_error = control.rounding_sum;
     PetscCall(observe(state, row));
   }
   *finished = true;

@@ -22,6 +22,8 @@ public:
     force_ = full_;
   }
 
+  bool isLoad() const override { return true; }
+
   void beginStep(const State &, const Configuration &start, const Step &step, int rod) override {
     start_ = &start;
     setLoadFactor(step.load_factor);

@@ -44,7 +44,7 @@ void writeCheckpoint(const std::string &path, const State &state, const StepCont
     }
     if (!state.strains.empty()) file.write("strains", {state.strains.size()}, state.strains.data());
     const double loop[] = {state.time,    double(state.step), control.dt,    double(control.good), double(control.stable),
-                           control.error, control.error_sum,  state.last_dt, code(integrator)};
+                           control.error, control.error_sum,  state.last_dt, code(integrator),     control.rounding_sum};
     file.write("loop", {std::size(loop)}, loop);
   }
   std::error_code error;
@@ -62,10 +62,10 @@ void readCheckpoint(const std::string &path, State *state, StepControl *control,
     std::copy(read.begin(), read.end(), reinterpret_cast<double *>(values.data()));
   });
   const std::vector<double> loop = file.read("loop", 1);
-  if (loop.size() != 9) throw SceneError(path + ": 'loop' is not that of a checkpoint");
+  if (loop.size() != 10) throw SceneError(path + ": 'loop' is not that of a checkpoint");
   state->time = loop[0];
   state->step = std::int64_t(loop[1]);
-  *control = {loop[2], int(loop[3]), loop[4] != 0, loop[5], loop[6]};
+  *control = {loop[2], int(loop[3]), loop[4] != 0, loop[5], loop[6], loop[9]};
   state->memory.clear();
   state->strains.clear();
   state->last_dt = 0;

@@ -49,10 +49,18 @@ const std::vector<Entry> &entries() {
         {"output_interval", "time between frames [s]; steps end at its multiples, shorter than dt where it is no divisor; 0: every step", "0"},
         {"checkpoint_interval", "steps between checkpoints; 0: only at the end", "0"},
         {"restart", "checkpoint of the same scene to go on from, to the same bits; the results go to another folder", "(none)"},
-        {"output_fields", "fields of a frame besides the position: all for " + joined(TrajectoryWriter::fieldNames()) + "; by name also " + joined(TrajectoryWriter::derivedFieldNames()), "all"},
-        {"error_estimate", "solve statics again with half the edge length and tell the estimated error; in dynamics tell that in time, where the integrator leaves it", "false"},
-        {"accuracy", "largest relative error: chooses the edges of every rod, and in dynamics -dt (or -dt_rtol and -dt_atol), so that the estimate is below", "(edges from the scene)"},
-        {"accuracy_of", "whose error: position (the largest, over the rod's length), tip (over the rod's length), or energy (elastic); in dynamics root mean square in time", "position"},
+        {"output_fields",
+         "fields of a frame besides the position: all for " + joined(TrajectoryWriter::fieldNames()) + "; by name also " +
+             joined(TrajectoryWriter::derivedFieldNames()),
+         "all"},
+        {"error_estimate",
+         "solve statics again with half the edge length and tell the estimated error; in dynamics tell that in time, where the integrator leaves it", "false"},
+        {"accuracy", "largest relative error: chooses the edges of every rod, and in dynamics -dt (or -dt_rtol and -dt_atol), so that the estimate is below",
+         "(edges from the scene)"},
+        {"accuracy_of",
+         "whose error: position (the largest, over the rod's length), tip (over the rod's length), or energy (elastic); in dynamics root mean square in time",
+         "position"},
+        {"rounding_tolerance", "where rounding stops Newton: what is left of the answer, over what the step or its loads move, at most", "1e-3"},
         {"retraction", "how positions move: additive (straight), or length (keeping the linearised lengths of the edges)", "length"},
         {"stretch", "axial force: primal (from the strain), or mixed (an unknown of its own)", "mixed"},
         {"hessian", "exact, or gauss_newton (without second derivatives of the strains; for comparison)", "exact"},
@@ -119,8 +127,7 @@ public:
       double value = 0;
       try {
         value = std::stod(word, &used);
-      } catch (const std::exception &) {
-      }
+      } catch (const std::exception &) {}
       if (used == 0 || used != word.size()) fail(name, "'" + word + "' is not a number");
       if (!std::isfinite(value)) fail(name, "must be finite, found '" + word + "'");
       values.push_back(value);
@@ -185,7 +192,8 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
     if (o->loop.integrator.name != "generalized_alpha") fail("rho_inf", "needs -integrator generalized_alpha");
   }
   if (texts.has("dt_adapt")) o->loop.adapt = texts.oneOf("dt_adapt", {"none", "error"}) == "error" ? Adaptation::error : Adaptation::none;
-  for (const auto &[name, target] : std::initializer_list<std::pair<const char *, double *>>{{"dt_rtol", &o->loop.dt_rtol}, {"dt_atol", &o->loop.dt_atol}, {"dt_max", &o->loop.dt_max}})
+  for (const auto &[name, target] :
+       std::initializer_list<std::pair<const char *, double *>>{{"dt_rtol", &o->loop.dt_rtol}, {"dt_atol", &o->loop.dt_atol}, {"dt_max", &o->loop.dt_max}})
     if (texts.has(name)) {
       *target = texts.positive(name);
       if (o->loop.adapt == Adaptation::none) fail(name, "needs -dt_adapt error");
@@ -223,6 +231,10 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   if (texts.has("accuracy")) {
     o->accuracy = {texts.positive("accuracy"), o->accuracy_of.value_or(Quantity::position)};
     if (o->accuracy->tolerance >= 1) fail("accuracy", "is relative and must be below 1, e.g. 1e-3; found '" + texts.at("accuracy") + "'");
+  }
+  if (texts.has("rounding_tolerance")) {
+    o->loop.rounding_tolerance = texts.positive("rounding_tolerance");
+    if (o->loop.rounding_tolerance >= 1) fail("rounding_tolerance", "must be below 1, found '" + texts.at("rounding_tolerance") + "'");
   }
   if (texts.has("retraction"))
     o->loop.retraction = texts.oneOf("retraction", {"additive", "length"}) == "additive" ? RetractionKind::additive : RetractionKind::length;
@@ -262,7 +274,8 @@ void resolve(const RunSettings &scene, Options &o) {
     o.loop.dt = o.dt.value_or(scene.dt);
     o.loop.t_end = o.t_end.value_or(scene.t_end);
     if (o.loop.t_end / o.loop.dt > 1e12)
-      fail("dt", "a step of " + std::to_string(o.loop.dt) + " s never reaches the end at " + std::to_string(o.loop.t_end) + " s; write a larger dt or a smaller t_end");
+      fail("dt", "a step of " + std::to_string(o.loop.dt) + " s never reaches the end at " + std::to_string(o.loop.t_end) +
+                     " s; write a larger dt or a smaller t_end");
   } else {
     if (o.dt) fail("dt", "has no meaning in -mode static; use -load_steps");
     if (o.t_end) fail("t_end", "has no meaning in -mode static; the load factor ends at 1");
@@ -271,7 +284,8 @@ void resolve(const RunSettings &scene, Options &o) {
     o.loop.dt = 1.0 / o.load_steps;
     const bool arclength = o.loop.continuation == Continuation::arclength;
     if (o.arclength_steps && !arclength) fail("arclength_steps", "needs -continuation arclength");
-    if (o.bifurcation && arclength) fail("bifurcation", "belongs to -continuation load; along the arc length, negative_pivots in the diagnostics tells stability");
+    if (o.bifurcation && arclength)
+      fail("bifurcation", "belongs to -continuation load; along the arc length, negative_pivots in the diagnostics tells stability");
   }
   checkAccuracy(o);
   if (o.loop.dt_min > o.loop.dt) fail("dt_min", "must not be larger than the step " + std::to_string(o.loop.dt));
@@ -343,6 +357,7 @@ void writeOptionsFile(const std::string &path, const Options &o, const Provenanc
     put("accuracy", o.accuracy->tolerance);
     put("accuracy_of", o.accuracy->of == Quantity::tip ? "tip" : o.accuracy->of == Quantity::energy ? "energy" : "position");
   }
+  put("rounding_tolerance", o.loop.rounding_tolerance);
   put("retraction", o.loop.retraction == RetractionKind::length ? "length" : "additive");
   put("stretch", o.loop.mixed ? "mixed" : "primal");
   put("hessian", o.loop.hessian == HessianKind::exact ? "exact" : "gauss_newton");

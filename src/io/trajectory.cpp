@@ -89,7 +89,8 @@ const std::vector<std::string> &Diagnostics::names() {
                                               "rejected_steps",
                                               "wall_seconds",
                                               "error_estimate",
-                                              "rejected_iterations"};
+                                              "rejected_iterations",
+                                              "rounding_error"};
   return names;
 }
 
@@ -108,7 +109,8 @@ std::vector<double> Diagnostics::values() const {
           double(rejected_steps),
           wall_seconds,
           error_estimate,
-          double(rejected_iterations)};
+          double(rejected_iterations),
+          rounding_error};
 }
 
 TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene, const Elements &elements, const Provenance &provenance,

@@ -63,18 +63,14 @@ double dot(const RodRange &rod, const Planes &a, const Planes &b) {
 
 NewtonWork::NewtonWork(const IncrementalPotential &potential, int slots)
     : wanted(potential.all().end, true), shift(wanted.size(), 0), last_shift(shift), negative(wanted.size(), 0), energy(wanted.size()),
-      energy_known(wanted.size(), false), residual(wanted.size()), moving(wanted.size(), false), increment(slot_size, slots), coordinates(increment),
-      trial(slots), motion(potential.dofs().makePlanes()), metric(shiftMetric(potential.elements(), potential.dofs())) {}
+      energy_known(wanted.size(), false), residual(wanted.size()), moving(wanted.size(), false), standstill(wanted.size()), left(wanted.size(), 0),
+      load_reach(wanted.size(), 0), load_energy(wanted.size(), 0), increment(slot_size, slots), coordinates(increment), trial(slots),
+      motion(potential.dofs().makePlanes()), metric(shiftMetric(potential.elements(), potential.dofs())) {}
 
 void NewtonWork::setOrigin(int first_slot) {
   increment.setOrigin(first_slot);
   coordinates.setOrigin(first_slot);
   trial.setOrigin(first_slot);
-}
-
-bool isSmall(const IncrementalPotential::Residual &r, double rtol) {
-  return r.force <= std::max(rtol, r.force_floor) && r.moment <= std::max(rtol, r.moment_floor) &&
-         r.compatibility <= std::max(1e-4 * rtol, r.compatibility_floor);
 }
 
 PetscErrorCode registerSolvers() {
@@ -239,7 +235,7 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
   rtol *= sharpness_;
   report_.iterations = int(iteration);
   const bool moving = potential_->remainingMotion(rods_, work_->motion);
-  bool done = true, finite = true;
+  bool done = true, finite = true, lost = false;
   IncrementalPotential::Residual &worst = report_.residual = {};
   for (int r = rods_.begin; r < rods_.end; ++r) {
     const RodRange &rod = potential_->elements().rods[r];
@@ -248,7 +244,9 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
       residual = potential_->residual(r, energyAtIterate(r));
       work_->moving[r] = moving && dot(rod, work_->motion, work_->motion) > 0;
       finite = finite && residual.isFinite();
-      work_->wanted[r] = work_->moving[r] || !isSmall(residual, rtol);
+      const Verdict verdict = finite && !work_->moving[r] ? judge(r, rtol) : Verdict::going;
+      lost = lost || verdict == Verdict::lost;
+      work_->wanted[r] = verdict != Verdict::answer;
       done = done && !work_->wanted[r];
     }
     worst.include(residual);
@@ -257,6 +255,8 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
   *reason = SNES_CONVERGED_ITERATING;
   if (!finite)
     *reason = SNES_DIVERGED_FNORM_NAN;
+  else if (lost)
+    *reason = SNES_DIVERGED_LOCAL_MIN; // its meaning here: what is left is rounding
   else if (done)
     *reason = SNES_CONVERGED_FNORM_RELATIVE;
   else if (iteration >= limit)
@@ -345,6 +345,9 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
     }
   const IncrementalPotential::RodEnergy before = energyAtIterate(r);
   IncrementalPotential::RodEnergy after;
+  Standstill &standstill = work_->standstill[r];
+  standstill.known = work_->shift[r] == 0 && !work_->moving[r] && report_.neutral_pivots == 0;
+  standstill.energy = slope;
   auto attempt = [&](double length) {
     ++report_.trials;
     (void)PetscLogEventBegin(events().configuration, 0, 0, 0, 0);
@@ -369,7 +372,17 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
     const double best = std::isfinite(after.value) && curvature > 0 ? -slope * *lambda * *lambda / (2 * curvature) : 0.5 * *lambda;
     *lambda = std::clamp(best, 0.2 * *lambda, 0.5 * *lambda);
   }
-  if (!accepted) return false;
+  if (!accepted) {
+    double size;
+    if (!standstill.known) return false;
+    if (!isLittle(r, &size)) {
+      if (isAtNoise(work_->residual[r], 0)) lost_ = roundingMessage(r, size);
+      return false;
+    }
+    standstill.iterations = most_trials; // what energies can tell is spent: the rod stays where it is
+    *lambda = 0;
+    return true;
+  }
   // A full step that gained clearly more than a quadratic would: the minimum lies beyond, as on the way down from a barrier.
   const double gain = (after.value - before.value) / slope;
   if (!free && *lambda == 1 && gain > 0.6 && gain < 1 && -slope > 1e3 * before.noise) {
@@ -441,35 +454,42 @@ void NewtonSolver::focus() {
   work_->setOrigin(potential_->elements().rods[rods_.begin].first_slot);
 }
 
-/// SNES from the potential's iterate. `failure` is null when it converged.
-PetscErrorCode NewtonSolver::newton(const char **failure) {
+/// SNES from the potential's iterate. `failure` is empty when it converged.
+PetscErrorCode NewtonSolver::newton(std::string *failure) {
   SNESConvergedReason reason;
   PetscFunctionBeginUser;
   fill(work_->wanted, true);
+  fill(work_->standstill, Standstill());
+  fill(work_->load_reach, std::nan(""));
+  lost_.clear();
   PetscCall(writeIterate(x_));
   const int before = report_.iterations;
   PetscCall(SNESSolve(snes_, nullptr, x_));
   report_.iterations += before;
   PetscCall(SNESGetConvergedReason(snes_, &reason));
-  *failure = nullptr;
+  failure->clear();
   if (reason > 0) PetscFunctionReturn(0);
-  switch (reason) {
-  case SNES_DIVERGED_MAX_IT:
-    *failure = "the iteration limit (-snes_max_it) was reached";
-    break;
-  case SNES_DIVERGED_LINE_SEARCH:
-    *failure = "no step along the search direction lowers the energy";
-    break;
-  case SNES_DIVERGED_FNORM_NAN:
-  case SNES_DIVERGED_FUNCTION_DOMAIN:
-    *failure = "the forces are not finite";
-    break;
-  case SNES_DIVERGED_LINEAR_SOLVE:
-    *failure = "the linear solve failed";
-    break;
-  default:
-    *failure = SNESConvergedReasons[reason];
-  }
+  report_.lost = !lost_.empty();
+  if (report_.lost)
+    *failure = lost_;
+  else
+    switch (reason) {
+    case SNES_DIVERGED_MAX_IT:
+      *failure = "the iteration limit (-snes_max_it) was reached";
+      break;
+    case SNES_DIVERGED_LINE_SEARCH:
+      *failure = "no step along the search direction lowers the energy";
+      break;
+    case SNES_DIVERGED_FNORM_NAN:
+    case SNES_DIVERGED_FUNCTION_DOMAIN:
+      *failure = "the forces are not finite";
+      break;
+    case SNES_DIVERGED_LINEAR_SOLVE:
+      *failure = "the linear solve failed";
+      break;
+    default:
+      *failure = SNESConvergedReasons[reason];
+    }
   PetscFunctionReturn(0);
 }
 
@@ -519,7 +539,8 @@ void NewtonSolver::predict(const State &start) {
 }
 
 PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, Seek seek, const Planes *guess) {
-  const char *failure = nullptr;
+  constexpr int most_rounds = 4; // of a tolerance made sharper
+  std::string failure;
   const bool is_static = potential_->step().isStatic();
   PetscFunctionBeginUser;
   focus();
@@ -538,14 +559,27 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
     failure = "a support turns past the barrier of measure tan at 180 degrees of twist per vertex; use more edges, or measure: angle";
   else
     PetscCall(newton(&failure));
-  // In statics the answer must be a minimum.
-  for (int k = 0; is_static && !failure; ++k) {
+  // In statics the answer must be a minimum, and the Hessian there says how far from it the iterate still is.
+  int rounds = 0;
+  for (int k = 0; is_static && failure.empty(); ++k) {
     int negative;
     PetscCall(inertiaAtIterate(&negative));
     report_.negative_pivots = negative;
     if (k == 0) report_.first_negative_pivots = negative;
     if (seek == Seek::equilibrium && negative >= 0) break;
-    if (negative == 0 || (negative > 0 && !potential_->scene().moments.empty())) break; // couples: no minimum to speak of
+    if (negative == 0 || (negative > 0 && !potential_->scene().moments.empty())) { // couples: no minimum to speak of
+      bool little;
+      PetscCall(verify(&little));
+      if (little) break;
+      if (++rounds == most_rounds) {
+        failure = lost_;
+        report_.lost = true;
+        break;
+      }
+      sharpness_ *= 1e-2;
+      PetscCall(newton(&failure));
+      continue;
+    }
     bool left = false, neutral = false;
     if (negative > 0 && k < 10) PetscCall(escapeSaddle(&left, &neutral));
     if (neutral && !left) {
@@ -561,8 +595,9 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
     sharpness_ *= 1e-2; // close to a branching the forces are small far from the equilibrium
     PetscCall(newton(&failure));
   }
-  report_.converged = !failure;
-  report_.reason = failure ? failure + nearBarrier() : "converged";
+  report_.converged = failure.empty();
+  for (int r = rods_.begin; r < rods_.end; ++r) report_.rounding_error = std::max(report_.rounding_error, work_->left[r]);
+  report_.reason = report_.converged ? "converged" : failure + nearBarrier();
   *report = report_;
   PetscFunctionReturn(0);
 }

@@ -105,6 +105,8 @@ void NewtonReport::include(const NewtonReport &block) {
   first_negative_pivots += block.first_negative_pivots;
   escapes += block.escapes;
   residual.include(block.residual);
+  rounding_error = std::max(rounding_error, block.rounding_error);
+  lost = lost || block.lost;
   if (history.size() < block.history.size()) history.resize(block.history.size(), 0.0);
   for (std::size_t k = 0; k < block.history.size(); ++k) history[k] = std::max(history[k], block.history[k]);
   if (block.converged) return;

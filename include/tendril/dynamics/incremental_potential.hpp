@@ -15,6 +15,8 @@ public:
   IncrementalPotential(const Scene &scene, DofMap &dofs, const Elements &elements, bool dynamic);
 
   RetractionKind retraction = RetractionKind::length; ///< of moves that do not name another
+  /// Where rounding keeps Newton from its tolerance: what is left counts as nothing below this part of what a step moves.
+  double rounding_tolerance = 1e-3;
 
   /// Starts a step; then every rod has to be started before anything else is asked of it: its iterate is the start state with supports'
   /// frames (not yet their positions) moved to the end of the step.
@@ -38,6 +40,7 @@ public:
   /// Energy of a rod [J]; +inf where the configuration is impossible. Rounding blurs it by `noise`: differences below decide nothing [J].
   struct RodEnergy {
     double value = std::numeric_limits<double>::infinity(), noise = 0;
+    double size = 0;                 ///< sum of the energies of all terms without their signs [J]
     double reach = 0, steepness = 1; ///< largest coordinate [m]; how much stiffer than at rest the steepest cell is
   };
   RodEnergy rodEnergy(const Configuration &configuration, int rod) const;
@@ -49,6 +52,8 @@ public:
   const Derivatives &derivatives(RodSet rods);
   /// The same without the Hessian where it is not known yet.
   const Derivatives &gradient(int rod);
+  /// Adds the gradient of the loads on a rod.
+  void addLoads(int rod, Derivatives &out) const;
   /// Of all rods, with room for them.
   const Derivatives &derivatives() {
     focus(all());
@@ -77,10 +82,10 @@ public:
 
   /// Residual relative to the load scale, and the strain error of the axial forces.
   struct Residual {
-    double force = 0, moment = 0; ///< 1 is the rod's load scale
-    double compatibility = 0;     ///< largest |strain - S/k|
+    double force = 0, moment = 0;                                      ///< 1 is the rod's load scale
+    double compatibility = 0;                                          ///< largest |strain - S/k|
     double force_floor = 0, moment_floor = 0, compatibility_floor = 0; ///< what rounding leaves, same units
-    void include(const Residual &other); ///< the larger of each; not a number is the largest
+    void include(const Residual &other);                               ///< the larger of each; not a number is the largest
     bool isFinite() const { return std::isfinite(force) && std::isfinite(moment); }
   };
   /// \param energy that of the iterate
@@ -91,7 +96,9 @@ public:
   /// Displacements of the iterate since the step began, and the rates that follow from them by a rule; strains when asked for.
   StageRates stageRates(const StageRule &rule, bool with_strains) const;
   const Configuration &start() const { return start_; }
-  double length(int rod) const { return length_[rod]; } ///< at rest [m]
+  double length(int rod) const { return length_[rod]; }         ///< at rest [m]
+  double shortestEdge(int rod) const { return shortest_[rod]; } ///< at rest [m]
+  double longestEdge(int rod) const { return longest_[rod]; }   ///< at rest [m]
   /// From the middle of a step to its end at `time`: positions, spins and directors move on by as much again (supports to their places), axial
   /// forces come from the strains. False when that leads to an impossible configuration.
   bool moveOn(double time);
@@ -131,9 +138,9 @@ private:
   RodSet focus_{0, 0};
   int room_ = 0; ///< slots
   enum class Known : char { nothing, gradient, all };
-  std::vector<Known> known_; ///< per rod: what derivatives_ holds of the iterate
+  std::vector<Known> known_;                                             ///< per rod: what derivatives_ holds of the iterate
   std::vector<double> load_, force_scale_, length_, shortest_, longest_; ///< per rod: loads [N], or 0; the present scale of forces [N]; lengths [m]
-  std::vector<double> bending_, shortest_cell_;                ///< per rod: sum of the cells' stiffnesses [N m]; [m]
+  std::vector<double> bending_, shortest_cell_;                          ///< per rod: sum of the cells' stiffnesses [N m]; [m]
   bool beyond_barrier_ = false;
 
   void commitTime(State &state) const {

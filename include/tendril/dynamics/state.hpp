@@ -74,7 +74,8 @@ public:
   template <class T> Vector3<T> edges(int slot) const { return displacements<T>(slot + 1, *this, slot); }
   /// Displacements from the slot of another configuration.
   template <class T> Vector3<T> displacements(int slot, const Configuration &from, int from_slot) const {
-    return (positions<T>(slot) - from.positions<T>(from_slot)) + (readVector<T>(values_, position_low, slot) - readVector<T>(from.values_, position_low, from_slot));
+    return (positions<T>(slot) - from.positions<T>(from_slot)) +
+           (readVector<T>(values_, position_low, slot) - readVector<T>(from.values_, position_low, from_slot));
   }
   template <class T> Vector3<T> displacements(int slot, const Configuration &from) const { return displacements<T>(slot, from, slot); }
   Vec3 displacementAt(int slot, const Configuration &from) const { return displacements<double>(slot, from); }

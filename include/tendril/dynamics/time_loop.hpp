@@ -23,10 +23,10 @@ struct LoopSettings {
   bool dynamic = true;
   IntegratorSettings integrator;
   Adaptation adapt = Adaptation::none;
-  double dt_rtol = 1e-3, dt_atol = 1e-6; ///< error of a step over rod lengths: at most atol + rtol x what it moved
-  double dt_max = 0;                     ///< of adapted steps; 0: no bound [s]
-  double output_interval = 0;            ///< steps end at its multiples; 0: anywhere [s]
-  bool estimate_error = false;           ///< also of steps that are not adapted
+  double dt_rtol = 1e-3, dt_atol = 1e-6;   ///< error of a step over rod lengths: at most atol + rtol x what it moved
+  double dt_max = 0;                       ///< of adapted steps; 0: no bound [s]
+  double output_interval = 0;              ///< steps end at its multiples; 0: anywhere [s]
+  bool estimate_error = false;             ///< also of steps that are not adapted
   double dt = 1e-2, dt_min = 0, t_end = 1; ///< in statics time is the load factor and ends at 1
   Continuation continuation = Continuation::load;
   Bifurcation bifurcation = Bifurcation::locate; ///< statics, load steps
@@ -34,15 +34,17 @@ struct LoopSettings {
   bool mixed = true;
   HessianKind hessian = HessianKind::exact;
   RetractionKind retraction = RetractionKind::length;
+  double rounding_tolerance = 1e-3; ///< see IncrementalPotential
 };
 
 /// How a loop is stepping: with the state, all that goes on from step to step.
 struct StepControl {
-  double dt = 0;      ///< of the next step [s, or load factor]; 0: that of the settings
-  int good = 0;       ///< steps since the last rejection
-  bool stable = true; ///< statics: the last state was a minimum
-  double error = 0;       ///< adapted steps: of the last one, over what is allowed; 0 where unknown
-  double error_sum = 0;   ///< of all steps, over rod lengths
+  double dt = 0;           ///< of the next step [s, or load factor]; 0: that of the settings
+  int good = 0;            ///< steps since the last rejection
+  bool stable = true;      ///< statics: the last state was a minimum
+  double error = 0;        ///< adapted steps: of the last one, over what is allowed; 0 where unknown
+  double error_sum = 0;    ///< of all steps, over rod lengths
+  double rounding_sum = 0; ///< of all steps, over rod lengths
 };
 
 /// Takes steps and tells the observer of each one accepted.

@@ -48,6 +48,8 @@ public:
   virtual void moveIterate(const Configuration & /*iterate*/, int /*rod*/) {}
   /// Called when the load factor changes within a step.
   virtual void setLoadFactor(double /*factor*/) {}
+  /// Whether it is the scene's loads.
+  virtual bool isLoad() const { return false; }
   /// [J], up to a constant of the step. Not finite where the configuration is impossible.
   virtual double energy(const Configuration &configuration, int rod) const = 0;
   /// Adds gradient and Hessian, pulled back by the retraction at the configuration.

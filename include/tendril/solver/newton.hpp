@@ -14,26 +14,40 @@ namespace tendril {
 /// What a solve did.
 struct NewtonReport {
   bool converged = false;
-  int iterations = 0;        ///< linear solves with a new Hessian
+  int iterations = 0;               ///< linear solves with a new Hessian
   std::int64_t edge_iterations = 0; ///< edges of the rods that took part, summed over the iterations
-  int trials = 0;            ///< energies of rods evaluated by the line search
-  int shifts = 0;            ///< factorisations repeated with a shifted diagonal
-  int negative_pivots = 0;   ///< of the last Hessian, unshifted
-  int neutral_pivots = 0;    ///< motions that cost no energy (solver type banded)
-  int first_negative_pivots = 0; ///< at the equilibrium found first, before any escape (statics)
-  int escapes = 0;           ///< saddles left along a direction of negative curvature (statics)
+  int trials = 0;                   ///< energies of rods evaluated by the line search
+  int shifts = 0;                   ///< factorisations repeated with a shifted diagonal
+  int negative_pivots = 0;          ///< of the last Hessian, unshifted
+  int neutral_pivots = 0;           ///< motions that cost no energy (solver type banded)
+  int first_negative_pivots = 0;    ///< at the equilibrium found first, before any escape (statics)
+  int escapes = 0;                  ///< saddles left along a direction of negative curvature (statics)
   IncrementalPotential::Residual residual;
+  /// Where rounding kept Newton from its tolerance, and in statics always: what is left to the answer, over rod lengths (root mean square), of the
+  /// worst rod.
+  double rounding_error = 0;
+  bool lost = false;           ///< in rounding: the failure of the step
   std::vector<double> history; ///< force residual, relative to the load scale, at every iterate
-  std::string reason;        ///< in words
+  std::string reason;          ///< in words
   /// Adds the report of another block of rods.
   void include(const NewtonReport &block);
 };
 
-/// Whether an iterate is an answer: each residual below `rtol` of its scale, or below what rounding leaves.
-bool isSmall(const IncrementalPotential::Residual &residual, double rtol);
+/// The largest of the residuals, in units of what it should fall to: `rtol` of its scale.
+double excess(const IncrementalPotential::Residual &residual, double rtol);
+/// Whether all residuals that are too large are at the level that rounding leaves, by an estimate. That says nothing about the answer: it is no verdict.
+bool isAtNoise(const IncrementalPotential::Residual &residual, double rtol);
 
 /// Which equilibria are answers in statics: minima, or any, reached by Newton's own full steps, for following a branch.
 enum class Seek { minimum, equilibrium };
+
+/// How Newton stands with a rod whose residual does not fall any more.
+struct Standstill {
+  bool known = false;     ///< whether the last increment is Newton's own: no shift, no supports on the way, no pivots replaced
+  double energy = 0;      ///< gradient times that increment [J]
+  double best = HUGE_VAL; ///< smallest excess so far
+  int iterations = 0;     ///< since it fell by half
+};
 
 /// What a solve keeps of rods and slots, for all solvers of a scene: each works on its own rods only.
 struct NewtonWork {
@@ -41,14 +55,17 @@ struct NewtonWork {
   NewtonWork(const IncrementalPotential &potential, int slots);
   /// Moves the work arrays to the rods from this slot on.
   void setOrigin(int first_slot);
-  std::vector<char> wanted;  ///< rods that have not converged yet
-  std::vector<double> shift, last_shift; ///< of the diagonal of indefinite Hessians, now and when it was last needed
-  std::vector<int> negative; ///< pivots; of all rods together where the linear solver does not tell them apart
+  std::vector<char> wanted;                            ///< rods that have not converged yet
+  std::vector<double> shift, last_shift;               ///< of the diagonal of indefinite Hessians, now and when it was last needed
+  std::vector<int> negative;                           ///< pivots; of all rods together where the linear solver does not tell them apart
   std::vector<IncrementalPotential::RodEnergy> energy; ///< at the iterate, ...
   std::vector<char> energy_known;                      ///< ... where it has been computed
   std::vector<IncrementalPotential::Residual> residual;
-  std::vector<char> moving;  ///< rods whose supports have not reached their places
-  Planes increment, coordinates; ///< work arrays
+  std::vector<char> moving; ///< rods whose supports have not reached their places
+  std::vector<Standstill> standstill;
+  std::vector<double> left;                    ///< of the answer, over the rod's length: what Newton would still move it by; 0 where the tolerance was met
+  std::vector<double> load_reach, load_energy; ///< what the loads would move, and the energy of that [J]; not a number where not known
+  Planes increment, coordinates;               ///< work arrays
   Configuration trial;
   Planes motion, metric;
   BandedWorkspace workspace;
@@ -87,14 +104,15 @@ private:
   bool banded_ = true;
   OwnedVec x_, f_, right_, solution_;
   std::optional<Circulatory> circulatory_; ///< where couples act
-  Vec iterate_vec_ = nullptr; ///< vector that holds the coordinates of the potential's iterate, ...
-  PetscObjectState iterate_state_ = 0; ///< ... and its state when they were written
+  Vec iterate_vec_ = nullptr;              ///< vector that holds the coordinates of the potential's iterate, ...
+  PetscObjectState iterate_state_ = 0;     ///< ... and its state when they were written
   NewtonReport report_;
   Seek seek_ = Seek::minimum;
   double sharpness_ = 1;
   double likely_ = 0; ///< residual from which the next iterate is likely an answer
+  std::string lost_;  ///< why the last solve was lost in rounding
 
-  PetscErrorCode newton(const char **failure);
+  PetscErrorCode newton(std::string *failure);
   PetscErrorCode moveTo(Vec x);
   PetscErrorCode writeIterate(Vec x);
   PetscErrorCode readInertia(bool *regular);
@@ -106,6 +124,14 @@ private:
   PetscErrorCode includeMotion(Vec y);
   PetscErrorCode includeCirculation(bool *regular);
   bool searchRod(int rod, double *lambda);
+  enum class Verdict { going, answer, lost };
+  Verdict judge(int rod, double rtol);
+  double sizeOf(int rod, const Planes &increment) const;
+  double movedBy(int rod) const;
+  bool isLittle(int rod, double *size);
+  PetscErrorCode findLoadReach();
+  PetscErrorCode verify(bool *little);
+  std::string roundingMessage(int rod, double size) const;
   PetscErrorCode findBucklingMode(bool *found, bool *neutral);
   PetscErrorCode escapeSaddle(bool *left, bool *neutral);
   void predict(const State &start);
@@ -113,7 +139,9 @@ private:
   void forgetEnergies() { fill(work_->energy_known, false); }
   /// Moves what is shared with other blocks here.
   void focus();
-  template <class Value, class Same> void fill(std::vector<Value> &values, Same value) { std::fill(values.begin() + rods_.begin, values.begin() + rods_.end, value); }
+  template <class Value, class Same> void fill(std::vector<Value> &values, Same value) {
+    std::fill(values.begin() + rods_.begin, values.begin() + rods_.end, value);
+  }
   std::string nearBarrier() const;
 };
 

@@ -1,0 +1,155 @@
+/// When an iterate is an answer. A residual below its tolerance is one. Rounding may keep the residual above: then the iterate counts when what is left to
+/// the equilibrium, Newton's own correction K^-1 r, is little against what the step, or its loads, move; else the step is lost in rounding. What rounding
+/// leaves of a residual is estimated too, but only to notice early that it does not fall any more.
+#include "tendril/solver/newton.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <sstream>
+
+namespace tendril {
+
+namespace {
+
+constexpr double compatibility_rtol = 1e-4; ///< of the axial forces' strain errors, against that of forces
+constexpr int patience = 3;                 ///< iterations without a fall of the residual
+
+} // namespace
+
+double excess(const IncrementalPotential::Residual &r, double rtol) { return std::max({r.force, r.moment, r.compatibility / compatibility_rtol}) / rtol; }
+
+bool isAtNoise(const IncrementalPotential::Residual &r, double rtol) {
+  return r.force <= std::max(rtol, r.force_floor) && r.moment <= std::max(rtol, r.moment_floor) &&
+         r.compatibility <= std::max(compatibility_rtol * rtol, r.compatibility_floor);
+}
+
+/// Root mean square of the displacements of a rod over its length and of its twists.
+double NewtonSolver::sizeOf(int r, const Planes &increment) const {
+  const RodRange &rod = potential_->elements().rods[r];
+  double positions = 0, twists = 0;
+  for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) positions += increment.vector(0, s).squaredNorm();
+  for (int s = rod.first_slot; rod.twist && s < rod.edgeEnd(); ++s) twists += increment[3][s] * increment[3][s];
+  const double length = potential_->length(r);
+  return std::sqrt(positions / (length * length * rod.vertices) + twists / rod.edges);
+}
+
+/// What the step has moved a rod by so far, as sizeOf.
+double NewtonSolver::movedBy(int r) const {
+  const RodRange &rod = potential_->elements().rods[r];
+  const Configuration &now = potential_->iterate();
+  double positions = 0, twists = 0;
+  for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) positions += now.displacementAt(s, potential_->start()).squaredNorm();
+  for (int s = rod.first_slot; rod.twist && s < rod.edgeEnd(); ++s) twists += now[Configuration::spin][s] * now[Configuration::spin][s];
+  const double length = potential_->length(r);
+  return std::sqrt(positions / (length * length * rod.vertices) + twists / rod.edges);
+}
+
+/// What the loads would move every rod by, with the matrix factored last.
+PetscErrorCode NewtonSolver::findLoadReach() {
+  PetscFunctionBeginUser;
+  const DofMap &dofs = potential_->dofs();
+  Derivatives loads(dofs.slots(rods_));
+  loads.setOrigin(dofs.rods()[rods_.begin].first_slot);
+  for (int r = rods_.begin; r < rods_.end; ++r) potential_->addLoads(r, loads);
+  Planes response(slot_size, dofs.slots(rods_));
+  response.setOrigin(loads.equilibrium.origin());
+  PetscCall(solveLinear(loads.equilibrium, response));
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    work_->load_reach[r] = sizeOf(r, response);
+    work_->load_energy[r] = 0;
+    for (int a = 0; a < slot_size; ++a)
+      for (int s = dofs.rods()[r].first_slot; s < dofs.rods()[r].vertexEnd(); ++s) work_->load_energy[r] += 0.5 * loads.equilibrium[a][s] * response[a][s];
+  }
+  PetscFunctionReturn(0);
+}
+
+/// Whether the last increment of a rod is little: against what the step or its loads move, in displacement and in energy; or against the rounding of the
+/// coordinates, for a rod at rest; or its energy is lost in rounding, for a motion that costs none. `size`: of the increment.
+bool NewtonSolver::isLittle(int r, double *size) {
+  constexpr double epsilon = std::numeric_limits<double>::epsilon();
+  const double tolerance = potential_->rounding_tolerance;
+  const IncrementalPotential::RodEnergy &energy = energyAtIterate(r);
+  const double cost = std::abs(work_->standstill[r].energy);
+  *size = sizeOf(r, work_->increment);
+  if (*size <= 4 * epsilon * std::max(1.0, energy.reach / potential_->length(r))) return true;
+  if (*size <= tolerance * movedBy(r) && cost <= tolerance * tolerance * energy.size) return true;
+  if (std::isnan(work_->load_reach[r]) && findLoadReach()) return false;
+  return *size <= tolerance * std::max(movedBy(r), work_->load_reach[r]) && cost <= tolerance * tolerance * std::max(energy.size, work_->load_energy[r]);
+}
+
+NewtonSolver::Verdict NewtonSolver::judge(int r, double rtol) {
+  Standstill &standstill = work_->standstill[r];
+  const double now = excess(work_->residual[r], rtol);
+  work_->left[r] = 0;
+  if (now <= 1) return Verdict::answer;
+  const bool falls = now < 0.5 * standstill.best, noise = isAtNoise(work_->residual[r], rtol);
+  if (!standstill.known || (falls && !noise)) {
+    standstill.best = std::min(now, standstill.best);
+    if (falls) standstill.iterations = 0;
+    return Verdict::going;
+  }
+  double size;
+  const bool little = isLittle(r, &size);
+  if (!noise && !little) { // far from an answer residuals rise and fall as they like
+    standstill.best = now;
+    standstill.iterations = 0;
+    return Verdict::going;
+  }
+  standstill.best = std::min(now, standstill.best);
+  standstill.iterations = falls ? 0 : standstill.iterations + 1;
+  if (!noise && standstill.iterations < patience) return Verdict::going;
+  if (little) {
+    work_->left[r] = size;
+    return Verdict::answer;
+  }
+  if (standstill.iterations < patience) return Verdict::going;
+  lost_ = roundingMessage(r, size);
+  return Verdict::lost;
+}
+
+/// At an equilibrium with its Hessian factored: whether what is left of every rod is little. Says nothing where zero pivots were replaced.
+PetscErrorCode NewtonSolver::verify(bool *little) {
+  bool regular = true;
+  PetscFunctionBeginUser;
+  *little = true;
+  if (report_.neutral_pivots > 0) PetscFunctionReturn(0);
+  const Planes &gradient = potential_->derivatives(rods_).gradient;
+  PetscCall(solveLinear(gradient, work_->increment));
+  if (circulatory_) PetscCall(includeCirculation(&regular));
+  fill(work_->load_reach, std::nan(""));
+  for (int r = rods_.begin; r < rods_.end && regular; ++r) {
+    const RodRange &rod = potential_->elements().rods[r];
+    double cost = 0, size;
+    for (int a = 0; a < slot_size; ++a)
+      for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) cost += gradient[a][s] * work_->increment[a][s];
+    work_->standstill[r].energy = cost;
+    if (isLittle(r, &size))
+      work_->left[r] = std::max(work_->left[r], size);
+    else if (std::abs(cost) > energyAtIterate(r).noise) { // else a motion that costs no energy
+      *little = false;
+      lost_ = roundingMessage(r, size);
+    }
+  }
+  PetscFunctionReturn(0);
+}
+
+std::string NewtonSolver::roundingMessage(int r, double size) const {
+  const Rod &rod = potential_->scene().rods[r];
+  const double shortest = potential_->shortestEdge(r), longest = potential_->longestEdge(r), reach = work_->energy[r].reach, length = potential_->length(r);
+  const int edge = int(std::find_if(potential_->elements().restLength() + potential_->elements().rods[r].first_slot,
+                                    potential_->elements().restLength() + potential_->elements().rods[r].edgeEnd(), [&](double l) { return l == shortest; }) -
+                       (potential_->elements().restLength() + potential_->elements().rods[r].first_slot));
+  std::ostringstream text;
+  text << std::setprecision(3) << "rod '" << rod.name << "' is lost in rounding: Newton would still move it by " << size
+       << " of its length, the step moves it by " << movedBy(r) << ", and the residual does not fall any more";
+  if (longest > 100 * shortest)
+    text << "; edge " << edge << " is " << shortest << " m long, the longest " << longest
+         << " m: take one of its vertices away, or use edges of more even length";
+  else
+    text << "; its " << rod.edges() << " edges are " << shortest << " m long: use fewer edges";
+  if (reach > 1e3 * length) text << "; it lies " << reach << " m from the origin: move the scene nearer to it";
+  return text.str();
+}
+
+} // namespace tendril
