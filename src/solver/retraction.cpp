@@ -35,6 +35,28 @@ void Retraction::setInverseTimeSquared(double value) {
     for (int i = 0; i < rod.edges; ++i) // a floor for rods without mass
       for (const int v : {i, (i + 1) % rod.vertices}) soft[rod.slot(v)] += 1e-8 * elements_.axialStiffness()[rod.slot(i)] * elements_.inverseRestLength()[rod.slot(i)];
     for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) soft[s] = elements_.freedom()[s] / (soft[s] + elements_.mass()[s] * value);
+    stiffenNearHeld(rod);
+  }
+}
+
+/// Corrections must not kink the rod where a held vertex stands still beside vertices that move: between two held vertices, at distances
+/// a and b, the softness is multiplied by (4ab/(a + b)^2)^2, which leaves position and direction at both as they are.
+void Retraction::stiffenNearHeld(const RodRange &rod) {
+  double *soft = work_[softness];
+  const double *freedom = elements_.freedom(), *length = elements_.restLength();
+  std::vector<int> held;
+  for (int i = 0; i < rod.vertices; ++i)
+    if (freedom[rod.slot(i)] == 0) held.push_back(i);
+  if (held.empty()) return;
+  if (rod.closed) held.push_back(held.front() + rod.vertices);
+  for (std::size_t k = 0; k + 1 < held.size(); ++k) {
+    auto slot = [&](int i) { return rod.slot(i % rod.vertices); };
+    double span = 0, a = 0;
+    for (int i = held[k]; i < held[k + 1]; ++i) span += length[slot(i)];
+    for (int i = held[k] + 1; i < held[k + 1]; ++i) {
+      a += length[slot(i - 1)];
+      soft[slot(i)] *= std::pow(4 * a * (span - a) / (span * span), 2);
+    }
   }
 }
 
