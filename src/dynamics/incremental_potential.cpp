@@ -469,9 +469,12 @@ void IncrementalPotential::commit(State &state, RodSet rods) const {
   for (int r = rods.begin; r < rods.end; ++r) {
     const RodRange &rod = elements_.rods[r];
     for (int n = elements_.rod_cells[r]; n < elements_.rod_cells[r + 1]; ++n) state.turns[n] = iterate_[C::turns][elements_.cell_slot[n]];
-    for (int i = 0; i < rod.vertices; ++i) {
-      state.position[rod.first_vertex + i] = iterate_.positionAt(rod.slot(i));
-      state.position_low[rod.first_vertex + i] = iterate_.values().vector(C::position_low, rod.slot(i));
+    for (int a = 0; a < 3; ++a) { // plane by plane
+      const double *high = iterate_[C::Plane(C::position + a)] + rod.first_slot, *low = iterate_[C::Plane(C::position_low + a)] + rod.first_slot;
+      for (int i = 0; i < rod.vertices; ++i) {
+        state.position[rod.first_vertex + i][a] = high[i];
+        state.position_low[rod.first_vertex + i][a] = low[i];
+      }
     }
     for (int i = 0; i < rod.edges; i += lanes) {
       const int slot = rod.slot(i), live = std::min(lanes, rod.edges - i);

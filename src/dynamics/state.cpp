@@ -90,10 +90,19 @@ void setSupports(const Scene &scene, const Elements &elements, double motion_tim
   using std::sqrt;
   const RodRange &rod = elements.rods[r];
   for (int n = elements.rod_cells[r]; n < elements.rod_cells[r + 1]; ++n) c[C::turns][elements.cell_slot[n]] = state.turns[n];
-  for (int i = 0; i < rod.vertices; ++i) c.setPosition(rod.slot(i), state.position[rod.first_vertex + i], state.position_low[rod.first_vertex + i]);
+  for (int a = 0; a < 3; ++a) { // plane by plane
+    double *high = c[C::Plane(C::position + a)] + rod.first_slot, *low = c[C::Plane(C::position_low + a)] + rod.first_slot;
+    for (int i = 0; i < rod.vertices; ++i) {
+      high[i] = state.position[rod.first_vertex + i][a];
+      low[i] = state.position_low[rod.first_vertex + i][a];
+    }
+  }
   c.closeRing(rod);
+  for (int a = 0; a < 3; ++a) {
+    double *director = c[C::Plane(C::director + a)] + rod.first_slot;
+    for (int i = 0; i < rod.edges; ++i) director[i] = state.director[rod.first_edge + i][a];
+  }
   for (int i = 0; i < rod.edges; ++i) {
-    for (int a = 0; a < 3; ++a) c[C::Plane(C::director + a)][rod.slot(i)] = state.director[rod.first_edge + i][a];
     c[C::axial_force][rod.slot(i)] = state.axial_force[rod.first_edge + i];
     c[C::spin][rod.slot(i)] = 0;
   }

@@ -184,7 +184,11 @@ private:
 #pragma GCC unroll 3
     for (int r = 0; r < 3; ++r)
 #pragma GCC unroll 3
-      for (int c = 0; c < 3; ++c) to[r].set(c, to[r][c] + read_(EdgeBlocks::vertex(std::min(r, c), std::max(r, c)), i));
+      for (int c = r; c < 3; ++c) {
+        const T v = to[r][c] + read_(EdgeBlocks::vertex(r, c), i);
+        to[r].set(c, v);
+        to[c].set(r, v);
+      }
   }
 
   /// From the far vertex of an edge to its near one: x_{i+1} = x_i + e_i, or zero where it is held.
@@ -224,8 +228,11 @@ private:
 #pragma GCC unroll 4
     for (int r = 0; r < edge_size; ++r) {
 #pragma GCC unroll 4
-      for (int c = r; c < edge_size; ++c) a[r][c] = state_[edge_at + r][edge_at + c] + own(r, c, i);
-      scale[r] = abs(state_[edge_at + r][edge_at + r]) + abs(own(r, r, i));
+      for (int c = r; c < edge_size; ++c) {
+        const T here = own(r, c, i), beyond = state_[edge_at + r][edge_at + c];
+        a[r][c] = beyond + here;
+        if (c == r) scale[r] = abs(beyond) + abs(here);
+      }
       b[r] = across(r, i);
 #pragma GCC unroll 3
       for (int c = 0; c < 3; ++c) b[r].set(c, state_[edge_at + r][c]);

@@ -4,6 +4,7 @@
 #include "tendril/solver/events.hpp"
 
 #include <petsc/private/linesearchimpl.h>
+#include <petsc/private/snesimpl.h>
 
 #include <algorithm>
 #include <cmath>
@@ -431,8 +432,8 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   }
   PetscCall(writeIterate(x));
   PetscCall(SNESComputeFunction(snes_, x, f));
-  PetscReal norm; // only monitors look at it; those of x and y serve tests that are not used here
-  PetscCall(VecNorm(f, NORM_2, &norm));
+  PetscReal norm = 0; // only monitors look at it; those of x and y serve tests that are not used here
+  if (snes_.object()->numbermonitors > 0) PetscCall(VecNorm(f, NORM_2, &norm));
   PetscCall(SNESLineSearchSetNorms(search, 0, norm, 0));
   PetscFunctionReturn(0);
 }
