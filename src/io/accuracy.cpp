@@ -92,7 +92,7 @@ PetscErrorCode estimateAt(const Scene &scene, const std::vector<Drawing> &drawin
     PetscFunctionReturn(0);
   }
   Estimate e;
-  PetscCall(estimateError(run, {}, redraw(scene, drawings, twice), settings, &e));
+  PetscCall(estimateError(run, answer.rounding_error, {}, redraw(scene, drawings, twice), settings, &e));
   round->none = e.none;
   if (!e.none.empty()) PetscFunctionReturn(0);
   for (const RodEstimate &r : e.rods)

@@ -358,10 +358,14 @@ private:
     choice_.edges = best.edges;
     choice_.loop = settingsAt(best.steps);
     const double finer = best.steps / (4.0 * base.steps);
+    double rounding_error = 0;
+    for (const auto &[resolution, run] : runs_) rounding_error = std::max(rounding_error, run.rounding_error);
+    if (rounding_error > accuracy_.tolerance)
+      throw SceneError(askedFor(accuracy_) + ": rounding alone makes errors of " + shortText(rounding_error) + "; write a larger tolerance");
     for (std::size_t r = 0; r < found.edges.size(); ++r) {
       choice_.step_error.push_back(found.steps[r].at(finer));
       choice_.edge_error.push_back(found.edges[r].at(best.edges[r] / (4.0 * base.edges[r])));
-      choice_.error.push_back(together(choice_.edge_error[r], choice_.step_error[r], found.correlation[r]));
+      choice_.error.push_back(std::max(rounding_error, together(choice_.edge_error[r], choice_.step_error[r], found.correlation[r])));
     }
     const double work = total(best.edges) * double(runs_.at(withSteps(base, 4)).steps) * finer;
     choice_.sayEdges(scene_, accuracy_);

@@ -11,8 +11,8 @@ namespace {
 
 /// Above this part of the largest displacement, a difference is not an error of discretisation.
 constexpr double most_difference = 0.3;
-/// Differences below this part of the length are rounding, whatever the displacement.
-constexpr double least_difference = 1e-6;
+/// Differences below this part of the length tell nothing about branches, whatever the displacement: coordinates have as many digits.
+constexpr double least_difference = 1e-14;
 
 constexpr std::pair<const char *, double EnergyBudget::*> energies[] = {
     {"stretch", &EnergyBudget::stretch}, {"bend", &EnergyBudget::bend}, {"twist", &EnergyBudget::twist}, {"gravity", &EnergyBudget::gravity}};
@@ -38,8 +38,8 @@ double lengthOf(const Rod &rod) {
   return length;
 }
 
-Answer answerOf(const Simulation &run, std::vector<double> critical) {
-  return {true, "", run.state.time, run.state.position, energyBudget(run.scene, *run.elements, run.state, run.state.time), std::move(critical)};
+Answer answerOf(const Simulation &run, double rounding_error, std::vector<double> critical) {
+  return {true, "", run.state.time, run.state.position, energyBudget(run.scene, *run.elements, run.state, run.state.time), std::move(critical), rounding_error};
 }
 
 PetscErrorCode solveStatics(Simulation &run, Scene scene, const LoopSettings &settings, Answer *answer) {
@@ -52,9 +52,15 @@ PetscErrorCode solveStatics(Simulation &run, Scene scene, const LoopSettings &se
     return PetscErrorCode(0);
   };
   bool found;
+  double rounding_error = 0;
   PetscCall(loop.run(
-      run.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &found));
-  *answer = answerOf(run, std::move(critical));
+      run.state,
+      [&](const State &, const Diagnostics &row) {
+        rounding_error = row.rounding_error;
+        return PetscErrorCode(0);
+      },
+      &found));
+  *answer = answerOf(run, rounding_error, std::move(critical));
   answer->found = found;
   answer->failure = loop.failure();
   PetscFunctionReturn(0);
@@ -70,15 +76,16 @@ static PetscErrorCode solveFrom(const Simulation &run, const Scene &scene, const
   PetscCall(fine.solver.solve(fine.state, TimeLoop::stepOf(settings, fine.state, 0), &report));
   if (report.converged) {
     fine.potential->commit(fine.state);
-    *answer = answerOf(fine);
+    *answer = answerOf(fine, report.rounding_error);
   } else
     answer->failure = report.reason;
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode estimateError(const Simulation &run, const std::vector<double> &critical, const Scene &scene, const LoopSettings &settings, Estimate *estimate) {
+PetscErrorCode estimateError(const Simulation &run, double rounding_error, const std::vector<double> &critical, const Scene &scene,
+                             const LoopSettings &settings, Estimate *estimate) {
   PetscFunctionBeginUser;
-  const Answer coarse = answerOf(run, critical);
+  const Answer coarse = answerOf(run, rounding_error, critical);
   Answer fine;
   estimate->none = "the run ended before its full load";
   if (coarse.load_factor == settings.t_end) {
@@ -112,13 +119,14 @@ int Estimate::worstRod() const {
 Estimate richardson(const Scene &scene, const Answer &coarse, const Answer &fine) {
   Estimate out;
   std::size_t first = 0, fine_first = 0; // vertices of the rod
+  const double rounding_error = coarse.rounding_error + fine.rounding_error;
   for (const Rod &rod : scene.rods) {
     RodEstimate &r = out.rods.emplace_back();
     out.tan = out.tan || rod.measure == Measure::tan;
     r.length = lengthOf(rod);
     for (int v = 0; v < rod.vertices(); ++v) {
       const Vec3 &a = coarse.position[first + v], &b = fine.position[fine_first + 2 * v];
-      const double error = (b - a).norm() * 4 / 3;
+      const double error = std::max((b - a).norm() * 4 / 3, rounding_error * r.length);
       out.position.push_back(b + (b - a) / 3);
       out.error.push_back(error);
       r.displacement = std::max(r.displacement, (a - rod.position[v]).norm());

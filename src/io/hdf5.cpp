@@ -113,7 +113,9 @@ void Hdf5File::writeAttribute(const std::string &group, const std::string &name,
 void Hdf5File::writeAttribute(const std::string &group, const std::string &name, double value) { attach(groupAt(group), name, value); }
 void Hdf5File::writeAttribute(const std::string &group, const std::string &name, int value) { attach(groupAt(group), name, value); }
 
-Hdf5Group Hdf5File::groupAt(const std::string &name) const { return checked(H5Gopen2(file_, name.c_str(), H5P_DEFAULT), path_ + ": has no group '" + name + "'"); }
+Hdf5Group Hdf5File::groupAt(const std::string &name) const {
+  return checked(H5Gopen2(file_, name.c_str(), H5P_DEFAULT), path_ + ": has no group '" + name + "'");
+}
 
 Hdf5Series::Hdf5Series(const Hdf5File &file, const std::string &name, const std::vector<hsize_t> &slab, bool integer) : extent_(slab) {
   extent_.insert(extent_.begin(), 0);

@@ -45,7 +45,8 @@ std::string groupsText(const Scene &scene) {
     if (scene.rods[r].material.isCable())
       s << ", a cable\n";
     else
-      s << ", rho g L^3/EI " << g.gravito_bending << ", EA L^2/EI " << g.axial_to_bending << ", largest turning " << g.largest_turning << " deg and twist " << g.largest_twist << " deg per vertex\n";
+      s << ", rho g L^3/EI " << g.gravito_bending << ", EA L^2/EI " << g.axial_to_bending << ", largest turning " << g.largest_turning << " deg and twist "
+        << g.largest_twist << " deg per vertex\n";
   }
   if (shown < scene.rods.size()) s << "... and " << scene.rods.size() - shown << " more rods\n";
   double turning = 0, twist = 0;
@@ -55,7 +56,8 @@ std::string groupsText(const Scene &scene) {
     twist = std::max(twist, g.largest_twist);
   }
   if (turning > 30 || twist > 30)
-    s << "warning: neighbouring edges turn or twist by up to " << std::max(turning, twist) << " degrees; above 30 the strains are more than 10 % off: use more edges\n";
+    s << "warning: neighbouring edges turn or twist by up to " << std::max(turning, twist)
+      << " degrees; above 30 the strains are more than 10 % off: use more edges\n";
   return s.str();
 }
 
@@ -158,11 +160,11 @@ PetscErrorCode meetAccuracy(Prepared &prepared, Options &o, Choice *choice) {
 }
 
 /// The error of a static answer, told and written.
-PetscErrorCode tellError(const Prepared &prepared, const std::vector<double> &critical, const Options &o, Progress &progress) {
+PetscErrorCode tellError(const Prepared &prepared, double rounding_error, const std::vector<double> &critical, const Options &o, Progress &progress) {
   PetscFunctionBeginUser;
   const Simulation &run = *prepared.run;
   Estimate estimate;
-  PetscCall(estimateError(run, critical, redraw(prepared.written, prepared.drawings, edgesOf(run.scene, 2)), o.loop, &estimate));
+  PetscCall(estimateError(run, rounding_error, critical, redraw(prepared.written, prepared.drawings, edgesOf(run.scene, 2)), o.loop, &estimate));
   for (const std::string &line : describe(estimate, run.scene)) progress.say(line);
   writeEstimate(o.output_dir + "/trajectory.h5", estimate);
   PetscFunctionReturn(0);
@@ -172,9 +174,11 @@ void tellTimeError(const Diagnostics &last, const Options &o, Progress &progress
   const std::optional<double> error = accumulatedTimeError(last);
   if (!error) return progress.say("no estimate: the diagnostics have no column error_estimate, in which an integrator leaves its error in time");
   std::ostringstream line;
-  line << "estimated error: " << std::setprecision(3) << *error << " rod lengths in time, the local errors of all steps added up; that of the edges is not in it";
+  const double with_rounding = *error + last.rounding_error;
+  line << "estimated error: " << std::setprecision(3) << with_rounding
+       << " rod lengths in time, the local errors of all steps and their rounding errors added up; that of the edges is not in it";
   progress.say(line.str());
-  writeTimeError(o.output_dir + "/trajectory.h5", *error);
+  writeTimeError(o.output_dir + "/trajectory.h5", with_rounding);
 }
 
 PetscErrorCode execute(int argc, char **argv, int *exit_code) {
@@ -210,7 +214,8 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
   Simulation &run = *prepared.run;
   TimeLoop loop(run.solver, o.loop);
   if (!o.restart.empty()) {
-    if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength) throw SceneError("option -restart: -continuation arclength cannot be taken up again");
+    if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength)
+      throw SceneError("option -restart: -continuation arclength cannot be taken up again");
     readCheckpoint(o.restart, &run.state, &loop.control, o.loop.integrator.name);
     std::error_code none;
     if (std::filesystem::equivalent(std::filesystem::absolute(o.restart).parent_path(), o.output_dir, none))
@@ -256,7 +261,8 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
     }
     progress.step(row);
     if (!o.loop.dynamic && row.negative_pivots > 0 && !warned) {
-      progress.say("warning: " + std::to_string(row.negative_pivots) + " negative pivots at an accepted state with couples: couples have no potential, so its stability is not known");
+      progress.say("warning: " + std::to_string(row.negative_pivots) +
+                   " negative pivots at an accepted state with couples: couples have no potential, so its stability is not known");
       warned = true;
     }
     PetscCall(PetscLogEventEnd(events().output, 0, 0, 0, 0));
@@ -292,8 +298,8 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
   PetscCall(PetscLogEventEnd(events().output, 0, 0, 0, 0));
   PetscCall(PetscLogStagePop());
   std::ostringstream summary;
-  summary << steps << " steps, " << iterations << " Newton iterations (mean " << std::setprecision(3) << (steps ? double(iterations) / double(steps) : 0) << "), " << rejected
-          << " rejected, " << last.wall_seconds << " s, results in " << o.output_dir;
+  summary << steps << " steps, " << iterations << " Newton iterations (mean " << std::setprecision(3) << (steps ? double(iterations) / double(steps) : 0)
+          << "), " << rejected << " rejected, " << last.wall_seconds << " s, results in " << o.output_dir;
   progress.say(summary.str());
   if (!finished) {
     progress.say("failed: " + failure);
@@ -302,7 +308,7 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
   }
   writer.reset();
   if (finished && o.error_estimate && o.loop.dynamic) tellTimeError(last, o, progress);
-  if (finished && o.error_estimate && !o.loop.dynamic) PetscCall(tellError(prepared, critical_factors, o, progress));
+  if (finished && o.error_estimate && !o.loop.dynamic) PetscCall(tellError(prepared, last.rounding_error, critical_factors, o, progress));
   PetscFunctionReturn(0);
 }
 

@@ -20,6 +20,7 @@ PetscErrorCode sample(Scene scene, const LoopSettings &settings, const std::vect
       run.state,
       [&](const State &state, const Diagnostics &row) {
         ++out->steps;
+        out->rounding_error = row.rounding_error;
         out->seconds = row.wall_seconds;
         if (next < times.size() && std::abs(state.time - times[next]) < 1e-6 * row.dt) {
           out->position.push_back(state.position);

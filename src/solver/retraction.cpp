@@ -33,7 +33,8 @@ void Retraction::setInverseTimeSquared(double value) {
   for (const RodRange &rod : elements_.rods) {
     for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) soft[s] = 0;
     for (int i = 0; i < rod.edges; ++i) // a floor for rods without mass
-      for (const int v : {i, (i + 1) % rod.vertices}) soft[rod.slot(v)] += 1e-8 * elements_.axialStiffness()[rod.slot(i)] * elements_.inverseRestLength()[rod.slot(i)];
+      for (const int v : {i, (i + 1) % rod.vertices})
+        soft[rod.slot(v)] += 1e-8 * elements_.axialStiffness()[rod.slot(i)] * elements_.inverseRestLength()[rod.slot(i)];
     for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) soft[s] = elements_.freedom()[s] / (soft[s] + elements_.mass()[s] * value);
     stiffenNearHeld(rod);
   }

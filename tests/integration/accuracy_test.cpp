@@ -32,7 +32,7 @@ void estimateOf(const SceneFile &file, const std::vector<int> &edges, const Loop
   Answer answer;
   EXPECT_PETSC(solveStatics(run, redraw(file.scene, file.drawings, edges), settings, &answer));
   ASSERT_TRUE(answer.found);
-  EXPECT_PETSC(estimateError(run, answer.critical, redraw(file.scene, file.drawings, twice), settings, &estimate));
+  EXPECT_PETSC(estimateError(run, answer.rounding_error, answer.critical, redraw(file.scene, file.drawings, twice), settings, &estimate));
 }
 
 TEST(ErrorEstimate, IsTheErrorOfTheElastica) {

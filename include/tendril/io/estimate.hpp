@@ -21,10 +21,11 @@ struct Answer {
   std::vector<Vec3> position;   ///< (nv) [m]
   EnergyBudget energy;          ///< [J]
   std::vector<double> critical; ///< load factors where stability was lost
+  double rounding_error = 0;    ///< over rod lengths (NewtonReport)
 };
 
 /// That of a run at its present state.
-Answer answerOf(const Simulation &run, std::vector<double> critical = {});
+Answer answerOf(const Simulation &run, double rounding_error, std::vector<double> critical = {});
 
 /// Sets a run up and takes it through its load steps. The settings are those of any run.
 PetscErrorCode solveStatics(Simulation &run, Scene scene, const LoopSettings &settings, Answer *answer);
@@ -54,13 +55,16 @@ struct Estimate {
   double elasticError() const { return std::abs(energy_error.stretch + energy_error.bend + energy_error.twist); }
 };
 
+/// No error is estimated below what rounding leaves of the two answers.
 /// \param scene that of `coarse`; `fine` has twice the edges of each rod
 Estimate richardson(const Scene &scene, const Answer &coarse, const Answer &fine);
 
 /// Solves with twice the edges, starting from the answer at hand so that both are on one branch of equilibria; where Newton does not find it from there,
 /// or critical loads were found on the way, by the load steps of the run.
+/// \param rounding_error of the run, over rod lengths
 /// \param fine the scene of `run` redrawn with twice the edges
-PetscErrorCode estimateError(const Simulation &run, const std::vector<double> &critical, const Scene &fine, const LoopSettings &settings, Estimate *estimate);
+PetscErrorCode estimateError(const Simulation &run, double rounding_error, const std::vector<double> &critical, const Scene &fine, const LoopSettings &settings,
+                             Estimate *estimate);
 
 /// Lines that tell an estimate to a user.
 std::vector<std::string> describe(const Estimate &estimate, const Scene &scene);

@@ -12,12 +12,13 @@ struct Samples {
   std::vector<int> edges;                  ///< per rod
   std::vector<std::vector<Vec3>> position; ///< at each time (nv) [m]
   std::vector<double> elastic;             ///< energy of all rods at each time [J]
+  double rounding_error = 0;               ///< of the run, over rod lengths
   long steps = 0;
   double seconds = 0; ///< of the time loop
   /// Edges x steps.
   double work() const;
   /// At the first time only.
-  Samples first() const { return {failure, edges, {position.front()}, {elastic.front()}, steps, seconds}; }
+  Samples first() const { return {failure, edges, {position.front()}, {elastic.front()}, rounding_error, steps, seconds}; }
 };
 
 /// Runs a scene in dynamics to its end. Steps have to end at the times; where a rejected step put them off, that is a failure.
