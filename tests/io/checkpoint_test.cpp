@@ -1,4 +1,5 @@
-/// Checkpoints hold every field of the state and of the time loop, whatever fields these have; and runs go on from them to the same bits.
+/// Checkpoints hold every field of the state and of the time loop, whatever fields these have; and runs go on from them
+/// to the same bits.
 #include "support/fields.hpp"
 #include "support/files.hpp"
 #include "support/rods.hpp"
@@ -63,7 +64,8 @@ Scene turnedScene(int edges = 8) {
   setBishopDirectors(ring);
   Scene scene;
   scene.rods = {bar, ring};
-  scene.supports = {hold(scene, 0, 0, Support::Kind::clamp), hold(scene, 0, edges, Support::Kind::clamp), hold(scene, 1, 5, Support::Kind::pin)};
+  scene.supports = {hold(scene, 0, 0, Support::Kind::clamp), hold(scene, 0, edges, Support::Kind::clamp),
+                    hold(scene, 1, 5, Support::Kind::pin)};
   scene.supports[0].motion.velocity = Vec3(0.1, 0, 0.2);
   scene.supports[1].motion.angular_velocity = Vec3(240, 0, 0);
   return scene;
@@ -113,10 +115,12 @@ TEST(Checkpoint, OfAnotherSceneIsRefused) {
   EXPECT_PETSC(other.setUp(turnedScene(9), dynamics(0.01, 1)));
   writeCheckpoint(path, sim.state, {}, "euler");
   StepControl control;
-  EXPECT_TRUE(says(messageOf([&] { readCheckpoint(path, &other.state, &control, "euler"); }), "restart with the scene that wrote the checkpoint"));
+  EXPECT_TRUE(says(messageOf([&] { readCheckpoint(path, &other.state, &control, "euler"); }),
+                   "restart with the scene that wrote the checkpoint"));
 }
 
-/// Every integrator, with steps as given and adapted ones. What it remembers, strains and whole turns are there where the checkpoint is written.
+/// Every integrator, with steps as given and adapted ones. What it remembers, strains and whole turns are there where
+/// the checkpoint is written.
 TEST(Checkpoint, RunsGoOnToTheSameBits) {
   const Folder folder;
   for (const std::string &name : integratorNames())
@@ -135,7 +139,8 @@ TEST(Checkpoint, RunsGoOnToTheSameBits) {
           if (writes && state.time > 0.07) {
             writeCheckpoint(path, state, loop.control, name);
             writes = false;
-            EXPECT_TRUE(std::any_of(state.turns.begin(), state.turns.begin() + sim.elements->rod_cells[1], [](double t) { return t != 0; }));
+            EXPECT_TRUE(std::any_of(state.turns.begin(), state.turns.begin() + sim.elements->rod_cells[1],
+                                    [](double t) { return t != 0; }));
             EXPECT_EQ(state.memory.empty(), name == "euler" || name == "sdirk2");
             EXPECT_EQ(state.strains.empty(), name == "euler" || name == "sdirk2");
             EXPECT_GT(loop.control.error_sum, 0);
