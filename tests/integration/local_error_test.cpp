@@ -80,7 +80,7 @@ double ratio(const std::string &integrator, double time, double h, double growth
 
 /// The next order in h is some hundredths; that of bdf2 without growth a tenth, for the step before has left its own
 /// error in the memory.
-TEST(ErrorEstimate, IsTheErrorOfAStep) {
+TEST(LocalError, IsThatOfTheEstimate) {
   EXPECT_EQ(PetscOptionsSetValue(nullptr, "-snes_rtol", "1e-11"), PetscErrorCode(0));
   for (const std::string &name : integratorNames())
     for (const double time : {0.1, 0.23})
