@@ -39,5 +39,18 @@ TEST(Rotation, AboutAFarCentreIsGravity) {
   for (std::size_t v = 0; v < a.state.position.size(); ++v) EXPECT_LT((a.state.position[v] - b.state.position[v]).norm(), 3e-6); // the field varies by 1e-6
 }
 
+/// The potential of the centrifugal force counts as gravity, -1/2 m |omega x (x - centre)|^2.
+TEST(Rotation, HasItsPotentialInTheDiagnostics) {
+  Scene scene = clampedScene(straightRod(10));
+  scene.rods[0].material.linear_density = 2;
+  scene.rotation.angular_velocity = Vec3(0, 0, 3);
+  scene.rotation.centre = Vec3(-1, 0, 5);
+  Simulation sim;
+  EXPECT_PETSC(sim.setUp(scene, statics()));
+  // The integral of 2/2 9 (1 + s)^2 by the trapezoidal rule: h^2/12 (f'(1) - f'(0)) above 21.
+  EXPECT_NEAR(energyBudget(sim.scene, *sim.elements, sim.state, 1).gravity, -(21 + 0.01 / 12 * 18), 1e-12);
+  EXPECT_NEAR(energyBudget(sim.scene, *sim.elements, sim.state, 0.5).gravity, -0.5 * (21 + 0.01 / 12 * 18), 1e-12);
+}
+
 } // namespace
 } // namespace tendril::test

@@ -159,5 +159,23 @@ TEST(Grading, TangentsOfSupportsAreOfSecondOrder) {
   EXPECT_GT(order(error(8), error(16)), 1.9);
 }
 
+/// At vertices all along a graded curve, where edges grow on one side and shrink on the other.
+TEST(Grading, TangentsOfSupportsLeanToTheShorterEdge) {
+  double weighted = 0, worst = 0;
+  for (int v = 2; v < 23; ++v) {
+    Scene scene = clampedScene(inextensibleRod(parabola(24).points));
+    scene.supports.push_back(hold(scene, 0, v, Support::Kind::clamp));
+    const std::vector<Drawing> drawings = graded(scene, parabola(24).curve);
+    const Scene fine = redraw(scene, drawings, {16 * edgeMultiple(scene, drawings[0], 0)});
+    const int at = fine.supports[1].vertex;
+    const Vec3 exact = Vec3(1, 4 * v / 24.0, 0).normalized();
+    const Frame before = referenceFrame(fine.rods[0], at - 1), after = referenceFrame(fine.rods[0], at);
+    const Vec3 mean = (before.tangent + after.tangent).normalized();
+    weighted = std::max(weighted, (mean - exact).norm());
+    worst = std::max(worst, (fine.supports[1].frame.tangent - exact).norm());
+  }
+  EXPECT_LT(worst, 0.2 * weighted); // than the mean of both edges would do; a tenth
+}
+
 } // namespace
 } // namespace tendril::test

@@ -67,5 +67,11 @@ TEST(Material, OnlyARodWithoutAnyBendingIsACable) {
   EXPECT_TRUE(m.isCable());
 }
 
+/// The inertia of twist is that of the section's area about its middle, not its torsion constant: they differ but for circles.
+TEST(Material, RotationalInertiaIsThatOfTheSecondMoments) {
+  const Material flat = homogeneousMaterial({SectionShape::rectangle, {0.03, 0.002}}, 1e9, 4e8, 1100);
+  EXPECT_NEAR(flat.linear_rotational_inertia, 1100 * 0.03 * 0.002 * (0.03 * 0.03 + 0.002 * 0.002) / 12, 1e-12 * flat.linear_density);
+}
+
 } // namespace
 } // namespace tendril::test

@@ -139,5 +139,15 @@ TEST(DimensionlessGroups, FollowTheirDefinitions) {
   EXPECT_NEAR(r.largest_twist, 0.2 * 180 / pi, 1e-12);
 }
 
+TEST(Motion, VelocityAtARowOfTheTableIsThatBefore) {
+  Motion motion;
+  motion.table = {{1, Vec3::Zero(), Vec3::Zero()}, {2, Vec3(4, 0, 0), Vec3::Zero()}, {4, Vec3(4, 6, 0), Vec3::Zero()}};
+  EXPECT_EQ(motion.velocityAt(1), Vec3(0, 0, 0));
+  EXPECT_EQ(motion.velocityAt(1.5), Vec3(4, 0, 0));
+  EXPECT_EQ(motion.velocityAt(2), Vec3(4, 0, 0));
+  EXPECT_EQ(motion.velocityAt(4), Vec3(0, 3, 0));
+  EXPECT_EQ(motion.velocityAt(4.5), Vec3(0, 0, 0));
+}
+
 } // namespace
 } // namespace tendril::test
