@@ -227,8 +227,8 @@ TEST(EveryTerm, HasTheDerivativeOfItsForces) {
     }
 }
 
-/// From a disturbed answer. The order over the last three residuals above rounding: 1 where a Hessian lacks something,
-/// 2 near enough to the answer. enough to the answer.
+/// From a disturbed answer. The order over the last three residuals that are clear of rounding: 1 where a Hessian lacks
+/// something, 2 near enough to the answer.
 TEST(EveryTerm, LetsNewtonConvergeQuadratically) {
   for (const Case &c : cases())
     for (const bool mixed : {false, true}) {
@@ -247,7 +247,7 @@ TEST(EveryTerm, LetsNewtonConvergeQuadratically) {
         char word[32];
         std::snprintf(word, sizeof word, " %.2g", r[k]);
         told += word;
-        if (k >= 2 && r[k] > 10 * report.residual.force_floor)
+        if (k >= 2 && r[k] > std::max(1e-9, 10 * report.residual.force_floor)) // 4e-11 is seen where axial forces round
           order = std::log(r[k] / r[k - 1]) / std::log(r[k - 1] / r[k - 2]);
       }
       EXPECT_GT(order, 1.3) << told;
