@@ -347,7 +347,8 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
   const IncrementalPotential::RodEnergy before = energyAtIterate(r);
   IncrementalPotential::RodEnergy after;
   Standstill &standstill = work_->standstill[r];
-  standstill.known = work_->shift[r] == 0 && !work_->moving[r] && report_.neutral_pivots == 0;
+  standstill.known = work_->shift[r] == 0 && !work_->moving[r];
+  standstill.blind = report_.neutral_pivots > 0;
   standstill.energy = slope;
   auto attempt = [&](double length) {
     ++report_.trials;
@@ -376,7 +377,7 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
   if (!accepted) {
     double size;
     if (!standstill.known) return false;
-    if (!isLittle(r, &size)) {
+    if (!isLittle(r, &size) && !isNeutral(r)) {
       if (isAtNoise(work_->residual[r], 0)) lost_ = roundingMessage(r, size);
       return false;
     }

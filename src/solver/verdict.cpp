@@ -12,6 +12,7 @@ namespace tendril {
 
 namespace {
 
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr double compatibility_rtol = 1e-4; ///< of the axial forces' strain errors, against that of forces
 constexpr int patience = 3;                 ///< iterations without a fall of the residual
 
@@ -65,9 +66,8 @@ PetscErrorCode NewtonSolver::findLoadReach() {
 }
 
 /// Whether the last increment of a rod is little: against what the step or its loads move, in displacement and in energy; or against the rounding of the
-/// coordinates, for a rod at rest; or its energy is lost in rounding, for a motion that costs none. `size`: of the increment.
+/// coordinates, for a rod at rest. `size`: of the increment.
 bool NewtonSolver::isLittle(int r, double *size) {
-  constexpr double epsilon = std::numeric_limits<double>::epsilon();
   const double tolerance = potential_->rounding_tolerance;
   const IncrementalPotential::RodEnergy &energy = energyAtIterate(r);
   const double cost = std::abs(work_->standstill[r].energy);
@@ -76,6 +76,14 @@ bool NewtonSolver::isLittle(int r, double *size) {
   if (*size <= tolerance * movedBy(r) && cost <= tolerance * tolerance * energy.size) return true;
   if (std::isnan(work_->load_reach[r]) && findLoadReach()) return false;
   return *size <= tolerance * std::max(movedBy(r), work_->load_reach[r]) && cost <= tolerance * tolerance * std::max(energy.size, work_->load_energy[r]);
+}
+
+/// Whether the last increment of a rod in statics costs no more energy than the rounding of its Hessian: a turn of a round rod about an axis, say, of which
+/// neither the forces nor the stiffness are known.
+bool NewtonSolver::isNeutral(int r) {
+  const RodRange &rod = potential_->elements().rods[r];
+  if (!potential_->step().isStatic()) return false;
+  return std::abs(work_->standstill[r].energy) <= 64 * epsilon * potential_->derivatives({r, r + 1}).blocks.magnitude(rod, work_->increment);
 }
 
 NewtonSolver::Verdict NewtonSolver::judge(int r, double rtol) {
@@ -98,22 +106,26 @@ NewtonSolver::Verdict NewtonSolver::judge(int r, double rtol) {
   }
   standstill.best = std::min(now, standstill.best);
   standstill.iterations = falls ? 0 : standstill.iterations + 1;
-  if (!noise && standstill.iterations < patience) return Verdict::going;
-  if (little) {
+  const bool stands = standstill.iterations >= patience;
+  if (!noise && !stands) return Verdict::going;
+  if (little && !standstill.blind) {
     work_->left[r] = size;
     return Verdict::answer;
   }
-  if (standstill.iterations < patience) return Verdict::going;
+  if (!stands) return Verdict::going;
+  if (potential_->step().isStatic() && (standstill.blind || isNeutral(r))) return Verdict::answer; // for verify to judge
   lost_ = roundingMessage(r, size);
   return Verdict::lost;
 }
 
-/// At an equilibrium with its Hessian factored: whether what is left of every rod is little. Says nothing where zero pivots were replaced.
+/// At an equilibrium with its Hessian factored: whether what is left of every rod is little. Zero pivots leave motions out of that: then the residual alone
+/// has to be below the tolerance.
 PetscErrorCode NewtonSolver::verify(bool *little) {
   bool regular = true;
+  PetscReal rtol;
   PetscFunctionBeginUser;
   *little = true;
-  if (report_.neutral_pivots > 0) PetscFunctionReturn(0);
+  PetscCall(SNESGetTolerances(snes_, nullptr, &rtol, nullptr, nullptr, nullptr));
   const Planes &gradient = potential_->derivatives(rods_).gradient;
   PetscCall(solveLinear(gradient, work_->increment));
   if (circulatory_) PetscCall(includeCirculation(&regular));
@@ -124,12 +136,11 @@ PetscErrorCode NewtonSolver::verify(bool *little) {
     for (int a = 0; a < slot_size; ++a)
       for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) cost += gradient[a][s] * work_->increment[a][s];
     work_->standstill[r].energy = cost;
-    if (isLittle(r, &size))
-      work_->left[r] = std::max(work_->left[r], size);
-    else if (std::abs(cost) > energyAtIterate(r).noise) { // else a motion that costs no energy
-      *little = false;
-      lost_ = roundingMessage(r, size);
-    }
+    const bool here = isLittle(r, &size);
+    if (here) work_->left[r] = std::max(work_->left[r], size);
+    if (report_.neutral_pivots > 0 ? excess(work_->residual[r], rtol) <= 1 : here || isNeutral(r)) continue;
+    *little = false;
+    lost_ = roundingMessage(r, size);
   }
   PetscFunctionReturn(0);
 }

@@ -38,6 +38,9 @@ public:
   /// y += A x for one rod in vertex coordinates (x, y, z, twist of each slot), copies behind a ring included in x and in y.
   void multiply(const RodRange &rod, const Planes &x, Planes &y) const;
 
+  /// Sum of |x_i A_ij x_j| over the entries of one rod: what x'A x is the remainder of, with rounding of an epsilon of it.
+  double magnitude(const RodRange &rod, const Planes &x) const;
+
   /// Where the plane of an entry begins in data().
   std::size_t offset(const RodRange &rod, int plane) const {
     return lanes + std::size_t(slot_entries) * (rod.first_slot - origin_) + std::size_t(plane) * rod.slots;

@@ -43,7 +43,8 @@ enum class Seek { minimum, equilibrium };
 
 /// How Newton stands with a rod whose residual does not fall any more.
 struct Standstill {
-  bool known = false;     ///< whether the last increment is Newton's own: no shift, no supports on the way, no pivots replaced
+  bool known = false;     ///< whether the last increment is Newton's own: no shift, no supports on the way
+  bool blind = false;     ///< whether it leaves out motions without stiffness: zero pivots were replaced
   double energy = 0;      ///< gradient times that increment [J]
   double best = HUGE_VAL; ///< smallest excess so far
   int iterations = 0;     ///< since it fell by half
@@ -129,6 +130,7 @@ private:
   double sizeOf(int rod, const Planes &increment) const;
   double movedBy(int rod) const;
   bool isLittle(int rod, double *size);
+  bool isNeutral(int rod);
   PetscErrorCode findLoadReach();
   PetscErrorCode verify(bool *little);
   std::string roundingMessage(int rod, double size) const;
