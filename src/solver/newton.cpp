@@ -478,6 +478,8 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
     switch (reason) {
     case SNES_DIVERGED_MAX_IT:
       *failure = "the iteration limit (-snes_max_it) was reached";
+      for (int r = rods_.begin; r < rods_.end; ++r)
+        if (work_->wanted[r] && isAtNoise(work_->residual[r], 0)) *failure += "; " + roundingMessage(r, sizeOf(r, work_->increment));
       break;
     case SNES_DIVERGED_LINE_SEARCH:
       *failure = "no step along the search direction lowers the energy";

@@ -159,6 +159,9 @@ std::string NewtonSolver::roundingMessage(int r, double size) const {
          << " m: take one of its vertices away, or use edges of more even length";
   else
     text << "; its " << rod.edges() << " edges are " << shortest << " m long: use fewer edges";
+  const auto [k1, k2] = rod.material.flexural_stiffness;
+  if (std::max(k1, k2) > 1e12 * std::min(k1, k2) && std::min(k1, k2) > 0)
+    text << "; its flexural stiffnesses are " << k1 << " and " << k2 << " N m^2: make them less different";
   if (reach > 1e3 * length) text << "; it lies " << reach << " m from the origin: move the scene nearer to it";
   return text.str();
 }

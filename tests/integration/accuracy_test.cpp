@@ -98,6 +98,15 @@ TEST(ErrorEstimate, TellsWhenAnswersAreNotNeighbours) {
   EXPECT_TRUE(says(describe(e, coarse.scene)[0], "no estimate"));
 }
 
+/// Two answers may agree because both are lost in rounding.
+TEST(ErrorEstimate, IsNotBelowTheRoundingOfEitherAnswer) {
+  const Scene scene = clampedScene(straightRod(1, Measure::angle, 2));
+  Answer coarse{true, "", 1, {Vec3(0, 0, 0), Vec3(2, 1, 0)}, {}, {}, 1e-3}, fine{true, "", 1, {Vec3(0, 0, 0), Vec3(1, 0.5, 0), Vec3(2, 1, 0)}, {}, {}, 2e-3};
+  const Estimate e = richardson(scene, coarse, fine);
+  EXPECT_DOUBLE_EQ(e.rods[0].error, 3e-3 * 2); // both, over the length of 2
+  EXPECT_DOUBLE_EQ(e.rods[0].tip, 3e-3 * 2);
+}
+
 TEST(Accuracy, IsMetOnTheElastica) {
   const SceneFile file = verifyScene("tip_load");
   for (const Quantity of : {Quantity::position, Quantity::tip})
