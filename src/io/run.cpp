@@ -301,6 +301,11 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
   summary << steps << " steps, " << iterations << " Newton iterations (mean " << std::setprecision(3) << (steps ? double(iterations) / double(steps) : 0)
           << "), " << rejected << " rejected, " << last.wall_seconds << " s, results in " << o.output_dir;
   progress.say(summary.str());
+  if (last.rounding_error > 0) {
+    std::ostringstream rounding;
+    rounding << "rounding error: " << std::setprecision(2) << last.rounding_error << " of the rod length" << (o.loop.dynamic ? ", summed over the steps" : "");
+    progress.say(rounding.str());
+  }
   if (!finished) {
     progress.say("failed: " + failure);
     std::fprintf(stderr, "tendril: %s\n", failure.c_str());

@@ -19,7 +19,7 @@ struct Snapshot {
   RodStrains strains;
   RodActions actions;
 };
-enum class From { state, strains, actions };
+enum class From { state, second_word, strains, actions };
 
 struct Field {
   const char *name;
@@ -37,6 +37,7 @@ const Field fields[] = {
     {"axial_force", On::edges, 1, From::state, [](const Snapshot &s) { return s.state.axial_force.data(); }},
     // Measure `angle`: 2 pi x whole turns of each cell's twist [rad].
     {"turns", On::cells, 1, From::state, [](const Snapshot &s) { return s.state.turns.data(); }},
+    {"position_low", On::vertices, 3, From::second_word, [](const Snapshot &s) { return s.state.position_low[0].data(); }},
     {"curvature", On::vertices, 2, From::strains, [](const Snapshot &s) { return s.strains.curvature[0].data(); }},
     {"twist", On::vertices, 1, From::strains, [](const Snapshot &s) { return s.strains.twist.data(); }},
     {"strain_energy_density", On::vertices, 1, From::strains, [](const Snapshot &s) { return s.strains.strain_energy_density.data(); }},

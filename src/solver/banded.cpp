@@ -379,8 +379,7 @@ private:
       for (int p = 0; p < edge_size; ++p) {
         const T o = read_(EdgeBlocks::across(r, p), i + 1);
         mixed_[r].set(edge_at + p, -o);
-        corner_[r].set(edge_at + p, o);
-        corner_[edge_at + p].set(r, o);
+        corner_[r].set(edge_at + p, o); // of the corner only the upper triangle counts
       }
       b.set(r, -own(r, 3, i));
       bs.set(r, own(r, 3, i));

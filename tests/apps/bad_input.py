@@ -123,6 +123,9 @@ rows = [
     ("integrator in statics", None, ["-mode", "static", "-integrator", "bdf2"], ["-integrator", "static"]),
     ("rho_inf too large", None, ["-integrator", "generalized_alpha", "-rho_inf", "2"], ["-rho_inf", "0 to 1"]),
     ("rho_inf of another method", None, ["-rho_inf", "0.5"], ["-rho_inf", "generalized_alpha"]),
+    ("rounding tolerance of nothing", None, ["-rounding_tolerance", "0"], ["-rounding_tolerance", "greater than zero"]),
+    ("rounding tolerance of all", None, ["-rounding_tolerance", "1"], ["-rounding_tolerance", "below 1"]),
+    ("rounding tolerance in words", None, ["-rounding_tolerance", "little"], ["-rounding_tolerance", "not a number"]),
     ("tolerance without adapted steps", None, ["-dt_rtol", "1e-3"], ["-dt_rtol", "-dt_adapt error"]),
     ("stray word", None, ["extra"], ["'extra' belongs to no option"]),
     ("option without its dash", None, ["dt", "1e-3"], ["'dt' belongs to no option"]),
@@ -297,7 +300,7 @@ failures = len(complaints)
 for complaint in complaints:
     print(complaint)
 help_text = subprocess.run([program, "-help"], capture_output=True, text=True)
-for option in "scene mode dt dt_min integrator rho_inf dt_adapt dt_rtol dt_atol dt_max t_end load_steps continuation bifurcation arclength_steps gravity output_dir output_interval output_fields error_estimate accuracy accuracy_of retraction stretch rod_young rod_measure".split():
+for option in "scene mode dt dt_min integrator rho_inf dt_adapt dt_rtol dt_atol dt_max t_end load_steps continuation bifurcation arclength_steps gravity output_dir output_interval output_fields error_estimate accuracy accuracy_of rounding_tolerance retraction stretch rod_young rod_measure".split():
     if f"-{option}" not in help_text.stdout or help_text.returncode != 0:
         failures += 1
         print("-help does not list", option)

@@ -134,6 +134,15 @@ TEST(Banded, SolvesWhateverIsHeld) {
           if ((r == 1 ? 63 - pattern : pattern) >> v & 1) p.scene.supports.push_back(hold(p.scene, r, v, Support::Kind::pin));
       ASSERT_EQ(p.dofs.setUp(p.scene), PetscErrorCode(0));
       fill(p, 12);
+      for (int r = 0; r <= lanes; ++r) { // shifts of some rods, by a metric that differs from place to place
+        const RodRange &rod = p.dofs.rods()[r];
+        p.shift[r] = pattern % 2 * (r % 3);
+        for (int i = 0; i < rod.vertices; ++i)
+          for (int a = 0; a < slot_size; ++a) {
+            p.metric[a][rod.slot(i)] = a < 3 ? 1 + i : 0.5 + i;
+            if (const PetscInt u = p.dofs.unknown(rod.slot(i), a); u >= 0) p.dense(u, u) += p.shift[r] * p.metric[a][rod.slot(i)];
+          }
+      }
       BandedWorkspace workspace;
       BandedFactor banded(p.dofs, p.dofs.all(), workspace);
       const Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(p.dense.rows(), -1, 2);
