@@ -153,7 +153,7 @@ std::string NewtonSolver::roundingMessage(int r, double size) const {
                        (potential_->elements().restLength() + potential_->elements().rods[r].first_slot));
   std::ostringstream text;
   text << std::setprecision(3) << "rod '" << rod.name << "' is lost in rounding: Newton would still move it by " << size
-       << " of its length, the step moves it by " << movedBy(r) << ", and the residual does not fall any more";
+       << " of its length, the step moves it by " << movedBy(r) << " (-rounding_tolerance " << potential_->rounding_tolerance << "), and the residual does not fall any more";
   if (longest > 100 * shortest)
     text << "; edge " << edge << " is " << shortest << " m long, the longest " << longest
          << " m: take one of its vertices away, or use edges of more even length";
