@@ -1,0 +1,493 @@
+#pragma once
+/// \file elimination.hpp
+/// The kernel of `banded`: LDL^T of one rod's matrix over edge variables, or of a pack of rods of one shape, one to a lane; and the solution with it
+/// (docs/theory.md, Rounding).
+
+#include "tendril/layout/edge_blocks.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace tendril {
+
+/// Variables of what a rod beyond a vertex stores: the vertex' position and the vector and twist of the edge before it.
+inline constexpr int state_size = 7, edge_at = 3;
+
+/// Pivot of a row with its sign counted. What rounding has left of the numbers that were added to it, `scale`, is no pivot.
+template <class T> T countedPivot(const T &d, const T &scale, T &negative, T &neutral) {
+  using std::abs;
+  const auto lost = abs(d) <= T(16 * std::numeric_limits<double>::epsilon()) * scale;
+  neutral += select(lost, T(1.0), T(0.0));
+  negative += select(!lost && d < T(0.0), T(1.0), T(0.0));
+  return select(lost, select(scale > T(0.0), T(1e-6) * scale, T(1.0)), d);
+}
+
+/// A row over the variables of the state: of one rod in a register, of a pack of rods as so many packs.
+typedef double Octet __attribute__((vector_size(64), aligned(8)));
+template <class T> struct Row;
+template <> struct Row<double> {
+  static constexpr int size = 8;
+  Octet v{};
+  void store(double *p) const { *reinterpret_cast<Octet *>(p) = v; }
+  double operator[](int c) const { return v[c]; }
+  void set(int c, double x) { v[c] = x; }
+  /// What comes before column `first` may be left out.
+  void subtract(double a, const Row &b, int /*first*/ = 0) { v -= a * b.v; }
+  static void symmetrise(Row *) {}
+  Row scaled(double a) const { return {a * v}; }
+  void add(const Row &b) { v += b.v; }
+  /// What belongs to the position is the edge's, too.
+  void addPositionToEdge() { v += __builtin_shufflevector(v, Octet{}, 8, 8, 8, 0, 1, 2, 8, 8); }
+  void dropPosition() { v = __builtin_shufflevector(v, Octet{}, 8, 8, 8, 3, 4, 5, 6, 8); }
+};
+template <> struct Row<Pack> {
+  static constexpr int size = state_size;
+  Pack v[state_size] = {};
+  void store(Pack *p) const { std::copy_n(v, size, p); }
+  Pack operator[](int c) const { return v[c]; }
+  void set(int c, const Pack &x) { v[c] = x; }
+  void subtract(const Pack &a, const Row &b, int first = 0) {
+#pragma GCC unroll 7
+    for (int c = first; c < size; ++c) v[c] -= a * b.v[c];
+  }
+  /// The lower triangle from the upper one.
+  static void symmetrise(Row *rows) {
+#pragma GCC unroll 7
+    for (int r = 1; r < size; ++r)
+#pragma GCC unroll 7
+      for (int c = 0; c < r; ++c) rows[r].v[c] = rows[c].v[r];
+  }
+  Row scaled(const Pack &a) const {
+    Row r;
+#pragma GCC unroll 7
+    for (int c = 0; c < size; ++c) r.v[c] = a * v[c];
+    return r;
+  }
+  void add(const Row &b) {
+#pragma GCC unroll 7
+    for (int c = 0; c < size; ++c) v[c] += b.v[c];
+  }
+  void addPositionToEdge() {
+    for (int c = 0; c < 3; ++c) v[edge_at + c] += v[c];
+  }
+  void dropPosition() {
+    for (int c = 0; c < 3; ++c) v[c] = Pack(0.0);
+  }
+};
+
+/// A symmetric matrix over the state, or one of the state against a ring's border.
+template <class T> using Square = Row<T>[state_size];
+
+/// What is kept of an edge to solve with: G = A^-1 B, where A is the edge's own matrix and B what it has with the state; L and the inverse pivots of
+/// A = L D L'. An edge whose far vertex is held is known from the position, e = -x: its pivots are zero and its rows of G say so.
+template <class T> struct Record {
+  static constexpr int width = Row<T>::size, lower = edge_size * width, pivots = lower + 6;
+  static constexpr int plain = (pivots + edge_size + 7) / 8 * 8; ///< numbers of an edge
+  static constexpr int bordered = plain + edge_size * width;     ///< ... of a ring, with the rows of G for the border behind
+  static constexpr std::size_t of(const RodRange &rod) { return rod.closed ? bordered : plain; }
+};
+
+/// Numbers kept of the first vertex: L and inverse pivots of its position.
+inline constexpr std::size_t vertex_record = 8;
+
+/// L below the diagonal, row by row.
+inline constexpr int below(int r, int c) { return r * (r - 1) / 2 + c; }
+
+/// LDL^T of a small matrix: L, the inverse pivots and their signs. `scale`: of what was added to each diagonal.
+template <int n, class T> void factorSmall(T (&a)[n][n], const T *scale, T *lower, T *inverse, T &negative, T &neutral) {
+#pragma GCC unroll 4
+  for (int p = 0; p < n; ++p) {
+    inverse[p] = T(1.0) / countedPivot(a[p][p], scale[p], negative, neutral);
+#pragma GCC unroll 4
+    for (int r = p + 1; r < n; ++r) {
+      const T l = a[p][r] * inverse[p];
+#pragma GCC unroll 4
+      for (int c = r; c < n; ++c) a[r][c] -= l * a[p][c];
+      lower[below(r, p)] = l;
+    }
+  }
+}
+
+/// x = A^-1 x.
+template <int n, class T> void solveSmall(const T *lower, const T *inverse, T *x) {
+#pragma GCC unroll 4
+  for (int r = 1; r < n; ++r)
+#pragma GCC unroll 4
+    for (int c = 0; c < r; ++c) x[r] -= lower[below(r, c)] * x[c];
+#pragma GCC unroll 4
+  for (int r = n - 1; r >= 0; --r) {
+    x[r] *= inverse[r];
+#pragma GCC unroll 4
+    for (int c = r + 1; c < n; ++c) x[r] -= lower[below(c, r)] * x[c];
+  }
+}
+
+/// The elimination of one rod, or of a pack of rods of one shape. `Read`: read(plane, i) gives an entry of the blocks at local slot i, shift included.
+template <class T, bool ring, class Read> class Elimination {
+public:
+  Elimination(const RodRange &rod, const std::vector<char> &held, const Read &read, T *records)
+      : n_(rod.edges), last_(rod.vertices - 1), held_(held), read_(read), records_(records) {}
+
+  /// \param first receives L and inverse pivots of the first vertex
+  [[gnu::flatten]] void run(T *first) {
+    if (!ring && !held_[last_]) addVertex(last_, state_);
+    for (int i = n_ - 1; i > 0; --i) {
+      if (ring && i == last_)
+        closeRing();
+      else
+        step(i, nextHeld(i));
+    }
+    firstEdge();
+    using std::abs;
+    T a[3][3], scale[3];
+    for (int r = 0; r < 3; ++r) {
+      for (int c = r; c < 3; ++c) a[r][c] = state_[r][c];
+      scale[r] = abs(a[r][r]);
+    }
+    if (!held_[0])
+      factorSmall<3>(a, scale, first, first + 3, negative, neutral);
+    else
+      std::fill_n(first, 6, T(0.0));
+  }
+
+  T negative{0.0}, neutral{0.0};
+
+private:
+  static constexpr int width = Record<T>::width;
+  const int n_, last_;
+  const std::vector<char> &held_;
+  const Read &read_;
+  T *const records_;
+  Square<T> state_;
+  Square<T> mixed_, corner_; ///< of a ring: state with border, border with itself
+
+  T *record(int i) const { return records_ + std::size_t(i) * (ring ? Record<T>::bordered : Record<T>::plain); }
+  bool nextHeld(int i) const { return held_[ring && i == last_ ? 0 : i + 1]; }
+  T own(int r, int c, int i) const { return read_(EdgeBlocks::own(std::min(r, c), std::max(r, c)), i); }
+  /// Couplings of the edge before with variable c of edge i, as a row over the state.
+  Row<T> across(int c, int i) const {
+    Row<T> row;
+#pragma GCC unroll 4
+    for (int r = 0; r < edge_size; ++r) row.set(edge_at + r, read_(EdgeBlocks::across(r, c), i));
+    return row;
+  }
+  void addVertex(int i, Square<T> &to) const {
+#pragma GCC unroll 3
+    for (int r = 0; r < 3; ++r)
+#pragma GCC unroll 3
+      for (int c = r; c < 3; ++c) {
+        const T v = to[r][c] + read_(EdgeBlocks::vertex(r, c), i);
+        to[r].set(c, v);
+        to[c].set(r, v);
+      }
+  }
+
+  /// From the far vertex of an edge to its near one: x_{i+1} = x_i + e_i, or zero where it is held.
+  void moveBack(bool held) {
+    if (held) {
+#pragma GCC unroll 7
+      for (int r = 0; r < state_size; ++r) state_[r].dropPosition();
+#pragma GCC unroll 3
+      for (int r = 0; r < 3; ++r) state_[r] = {};
+    } else {
+#pragma GCC unroll 7
+      for (int r = 0; r < state_size; ++r) state_[r].addPositionToEdge();
+#pragma GCC unroll 3
+      for (int r = 0; r < 3; ++r) state_[edge_at + r].add(state_[r]);
+    }
+    if (!ring) return;
+    for (int r = 0; r < 3; ++r)
+      if (held)
+        mixed_[r] = {};
+      else
+        mixed_[edge_at + r].add(mixed_[r]);
+  }
+
+  /// Eliminates edge i from the state beyond its far vertex; leaves that beyond its near one.
+  void step(int i, bool held) {
+    moveBack(held);
+    if (held)
+      substitute(i);
+    else
+      eliminate(i);
+  }
+
+  void eliminate(int i) {
+    using std::abs;
+    T a[edge_size][edge_size], scale[edge_size];
+    Row<T> b[edge_size];
+#pragma GCC unroll 4
+    for (int r = 0; r < edge_size; ++r) {
+#pragma GCC unroll 4
+      for (int c = r; c < edge_size; ++c) {
+        const T here = own(r, c, i), beyond = state_[edge_at + r][edge_at + c];
+        a[r][c] = beyond + here;
+        if (c == r) scale[r] = abs(beyond) + abs(here);
+      }
+      b[r] = across(r, i);
+#pragma GCC unroll 3
+      for (int c = 0; c < 3; ++c) b[r].set(c, state_[edge_at + r][c]);
+    }
+    T *const out = record(i), *const lower = out + Record<T>::lower, *const inverse = out + Record<T>::pivots;
+    T l[6], d[edge_size];
+    factorSmall<edge_size>(a, scale, l, d, negative, neutral);
+    std::copy_n(l, 6, lower);
+    std::copy_n(d, edge_size, inverse);
+    reduce(b, l);
+    Square<T> next;
+#pragma GCC unroll 3
+    for (int r = 0; r < 3; ++r) {
+      next[r] = state_[r];
+      for (int c = edge_at; c < state_size; ++c) next[r].set(c, T(0.0));
+    }
+    addVertex(i, next);
+    T y[edge_size][width]; // the rows of L^-1 B as scalars
+    Row<T> z[edge_size];
+#pragma GCC unroll 4
+    for (int p = 0; p < edge_size; ++p) {
+      b[p].store(y[p]);
+      z[p] = b[p].scaled(d[p]);
+    }
+#pragma GCC unroll 4
+    for (int p = 0; p < edge_size; ++p)
+#pragma GCC unroll 7
+      for (int k = 0; k < state_size; ++k) next[k].subtract(y[p][k], z[p], k);
+    Row<T>::symmetrise(next);
+    if constexpr (ring) {
+      Row<T> bs[edge_size];
+      for (int r = 0; r < edge_size; ++r) {
+        bs[r] = mixed_[edge_at + r];
+        mixed_[edge_at + r] = {};
+      }
+      reduce(bs, l);
+      border(y, bs, d, l, out);
+    }
+    complete(z, l, out);
+#pragma GCC unroll 7
+    for (int k = 0; k < state_size; ++k) state_[k] = next[k];
+  }
+
+  /// rows = L^-1 rows
+  static void reduce(Row<T> (&rows)[edge_size], const T *l) {
+#pragma GCC unroll 4
+    for (int r = 1; r < edge_size; ++r)
+#pragma GCC unroll 4
+      for (int c = 0; c < r; ++c) rows[r].subtract(l[below(r, c)], rows[c]);
+  }
+
+  /// Stores rows = L^-T rows.
+  static void complete(Row<T> (&rows)[edge_size], const T *l, T *out) {
+#pragma GCC unroll 4
+    for (int r = edge_size - 1; r >= 0; --r) {
+#pragma GCC unroll 4
+      for (int c = r + 1; c < edge_size; ++c) rows[r].subtract(l[below(c, r)], rows[c]);
+      rows[r].store(out + r * width);
+    }
+  }
+
+  /// What the elimination of an edge does to the border, given the reduced rows of the state and of the border.
+  void border(const T (&y)[edge_size][width], const Row<T> (&bs)[edge_size], const T *d, const T *l, T *out) {
+    Row<T> z[edge_size];
+    for (int p = 0; p < edge_size; ++p) {
+      T ys[width];
+      bs[p].store(ys);
+      z[p] = bs[p].scaled(d[p]);
+      for (int k = 0; k < state_size; ++k) {
+        mixed_[k].subtract(y[p][k], z[p]);
+        corner_[k].subtract(ys[k], z[p]);
+      }
+    }
+    complete(z, l, out + Record<T>::plain);
+  }
+
+  /// Edge i between vertex i and a held one: e = -x. Only its twist is eliminated.
+  void substitute(int i) {
+    Square<T> next;
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c)
+        next[r].set(c, (state_[r][c] - state_[r][edge_at + c]) - (state_[edge_at + r][c] - (state_[edge_at + r][edge_at + c] + own(r, c, i))));
+      const Row<T> before = across(r, i);
+      for (int c = edge_at; c < state_size; ++c) {
+        next[r].set(c, -before[c]);
+        next[c].set(r, -before[c]);
+      }
+    }
+    addVertex(i, next);
+    constexpr int twist = state_size - 1;
+    Row<T> b = across(3, i);
+    for (int c = 0; c < 3; ++c) b.set(c, state_[twist][c] - (state_[twist][edge_at + c] + own(c, 3, i)));
+    if constexpr (ring) {
+      for (int r = 0; r < 3; ++r) mixed_[r].subtract(T(1.0), mixed_[edge_at + r]);
+      for (int r = 0; r < 3; ++r) mixed_[edge_at + r] = {};
+      const Row<T> bs = mixed_[twist];
+      mixed_[twist] = {};
+      eliminateTwist(i, next, b, bs);
+    } else
+      eliminateTwist(i, next, b, {});
+  }
+
+  void eliminateTwist(int i, Square<T> &next, const Row<T> &b, const Row<T> &bs) {
+    using std::abs;
+    constexpr int twist = state_size - 1;
+    const T scale = abs(state_[twist][twist]) + abs(own(3, 3, i));
+    T *const out = record(i);
+    std::fill_n(out, Record<T>::plain, T(0.0));
+    const T inverse = T(1.0) / countedPivot(T(state_[twist][twist] + own(3, 3, i)), scale, negative, neutral);
+    const Row<T> z = b.scaled(inverse);
+    for (int k = 0; k < state_size; ++k) next[k].subtract(b[k], z);
+    for (int r = 0; r < 3; ++r) out[r * width + r] = T(1.0);
+    z.store(out + 3 * width);
+    out[Record<T>::pivots + 3] = inverse;
+    if constexpr (ring) {
+      const Row<T> zs = bs.scaled(inverse);
+      for (int k = 0; k < state_size; ++k) {
+        mixed_[k].subtract(b[k], zs);
+        corner_[k].subtract(bs[k], zs);
+      }
+      std::fill_n(out + Record<T>::plain, 3 * width, T(0.0));
+      zs.store(out + Record<T>::plain + 3 * width);
+    }
+    for (int k = 0; k < state_size; ++k) state_[k] = next[k];
+  }
+
+  /// The last edge of a ring ends where the first begins, e = x_0 - x, and meets it in the cell behind the ring.
+  void closeRing() {
+    const int i = last_;
+    Square<T> next;
+    Row<T> b = across(3, i), bs;
+    for (int r = 0; r < 3; ++r) {
+      const Row<T> before = across(r, i);
+      for (int c = 0; c < 3; ++c) {
+        next[r].set(c, own(r, c, i));
+        mixed_[r].set(c, -own(r, c, i));
+        corner_[r].set(c, own(r, c, i));
+      }
+      for (int c = edge_at; c < state_size; ++c) {
+        next[r].set(c, -before[c]);
+        next[c].set(r, -before[c]);
+        mixed_[c].set(r, before[c]);
+      }
+      for (int p = 0; p < edge_size; ++p) {
+        const T o = read_(EdgeBlocks::across(r, p), i + 1);
+        mixed_[r].set(edge_at + p, -o);
+        corner_[r].set(edge_at + p, o); // of the corner only the upper triangle counts
+      }
+      b.set(r, -own(r, 3, i));
+      bs.set(r, own(r, 3, i));
+    }
+    for (int p = 0; p < edge_size; ++p) bs.set(edge_at + p, read_(EdgeBlocks::across(3, p), i + 1));
+    addVertex(i, next);
+    eliminateTwist(i, next, b, bs);
+    for (int r = 0; r < 3; ++r) record(i)[Record<T>::plain + r * width + r] = T(-1.0);
+  }
+
+  /// Behind it there is no edge, but in a ring the border joins in: it is this edge and its near vertex.
+  void firstEdge() {
+    moveBack(nextHeld(0));
+    if constexpr (ring) {
+      for (int r = 0; r < state_size; ++r)
+        for (int c = r; c < state_size; ++c) {
+          const T v = state_[r][c] + (mixed_[r][c] + mixed_[c][r]) + corner_[r][c];
+          state_[r].set(c, v);
+          state_[c].set(r, v);
+        }
+      for (Row<T> &row : mixed_) row = {};
+    }
+    nextHeld(0) ? substitute(0) : eliminate(0);
+  }
+};
+
+/// Values of the slots of a rod, right-hand side to solution, by the records of its factor.
+template <class T, bool ring>
+[[gnu::flatten]] void substituteAll(const RodRange &rod, const std::vector<char> &held, const T *records, const T *first, T *values) {
+  constexpr int w = Record<T>::width;
+  constexpr std::size_t size = ring ? Record<T>::bordered : Record<T>::plain;
+  const int last = rod.vertices - 1;
+  auto nextHeld = [&](int i) { return held[ring && i == last ? 0 : i + 1]; };
+  T q[state_size], border[state_size];
+  std::fill_n(q, state_size, T(0.0));
+  std::fill_n(border, state_size, T(0.0));
+  if (!ring)
+    for (int a = 0; a < 3; ++a) q[a] = values[slot_size * last + a];
+  for (int i = rod.edges - 1; i >= 0; --i) {
+    const T *g = records + size * i;
+    T *here = values + slot_size * i;
+    T r[edge_size];
+    const bool drops = nextHeld(i) || (ring && i == last);
+#pragma GCC unroll 3
+    for (int a = 0; a < 3; ++a) {
+      if (drops) q[a] = T(0.0);
+      if (ring && i == 0) {
+        r[a] = (q[edge_at + a] + q[a]) + border[edge_at + a];
+        q[a] += border[a];
+      } else
+        r[a] = q[edge_at + a] + q[a];
+    }
+    r[3] = q[edge_at + 3] + here[3];
+    if (ring && i == 0) r[3] += border[edge_at + 3];
+    T next[state_size];
+#pragma GCC unroll 7
+    for (int c = 0; c < state_size; ++c) {
+      T share = g[c] * r[0];
+#pragma GCC unroll 4
+      for (int p = 1; p < edge_size; ++p) share += g[p * w + c] * r[p];
+      next[c] = (c < 3 ? q[c] + here[c] : T(0.0)) - share;
+      if (ring && i > 0) {
+        const T *gs = g + Record<T>::plain;
+        T far = gs[c] * r[0];
+        for (int p = 1; p < edge_size; ++p) far += gs[p * w + c] * r[p];
+        border[c] -= far;
+      }
+    }
+#pragma GCC unroll 4
+    for (int p = 0; p < edge_size; ++p) here[p] = r[p];
+#pragma GCC unroll 7
+    for (int c = 0; c < state_size; ++c) q[c] = next[c];
+  }
+  T u[state_size];
+  std::fill_n(u, state_size, T(0.0));
+  if (!held[0]) {
+    std::copy_n(q, 3, u);
+    solveSmall<3>(first, first + 3, u);
+  }
+  std::copy_n(u, 3, border);
+  for (int i = 0; i < rod.edges; ++i) {
+    const T *g = records + size * i;
+    T *here = values + slot_size * i;
+    T v[edge_size];
+    std::copy_n(here, edge_size, v);
+    solveSmall<edge_size>(g + Record<T>::lower, g + Record<T>::pivots, v);
+    if (ring && i > 0) {
+      const T *gs = g + Record<T>::plain;
+      for (int p = 0; p < edge_size; ++p)
+        for (int c = 0; c < state_size; ++c) v[p] -= gs[p * w + c] * border[c];
+    }
+#pragma GCC unroll 4
+    for (int p = 0; p < edge_size; ++p) {
+      // Two sums: the position before the edge is known earlier than the edge before.
+      T share = g[p * w] * u[0];
+#pragma GCC unroll 3
+      for (int c = 1; c < 3; ++c) share += g[p * w + c] * u[c];
+      T turn = g[p * w + edge_at] * u[edge_at];
+#pragma GCC unroll 4
+      for (int c = edge_at + 1; c < state_size; ++c) turn += g[p * w + c] * u[c];
+      v[p] = (v[p] - share) - turn;
+    }
+    if (ring && i == 0)
+      for (int p = 0; p < edge_size; ++p) border[edge_at + p] = v[p];
+    const bool drops = nextHeld(i);
+#pragma GCC unroll 3
+    for (int a = 0; a < 3; ++a) {
+      here[a] = u[a];
+      u[a] = drops ? T(0.0) : u[a] + v[a];
+    }
+    here[3] = v[3];
+#pragma GCC unroll 4
+    for (int p = 0; p < edge_size; ++p) u[edge_at + p] = v[p];
+  }
+  if (ring) return;
+  for (int a = 0; a < 3; ++a) values[slot_size * last + a] = u[a];
+  values[slot_size * last + 3] = T(0.0);
+}
+
+} // namespace tendril
