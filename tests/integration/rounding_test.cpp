@@ -222,15 +222,19 @@ TEST(Rounding, LeavesMomentsOfStatesRight) {
   EXPECT_LT(worst, 1e-6); // from rounded positions it is 1e-2
 }
 
-/// Held at both ends and pushed in the middle, so light that no residual falls to its tolerance.
-TEST(Rounding, DoesNotStopALightThread) {
+/// Held at both ends and moved in the middle, so light that no residual falls to its tolerance.
+Scene lightThread() {
   Rod rod = straightRod(20, Measure::angle, 0.1);
   rod.material = homogeneousMaterial({SectionShape::circle, {2e-4, 2e-4}}, 7.5e8, 7.5e8 / 2.8, 3);
   Scene scene = clampedScene(rod);
   scene.supports.push_back(hold(scene, 0, 20, Support::Kind::clamp));
   scene.supports.push_back(hold(scene, 0, 10, Support::Kind::pin));
   scene.supports[2].motion.velocity = Vec3(0, 1e-4, 0);
-  const Outcome out = run(scene, dynamics(1e-3, 0.3));
+  return scene;
+}
+
+TEST(Rounding, DoesNotStopALightThread) {
+  const Outcome out = run(lightThread(), dynamics(1e-3, 0.3));
   ASSERT_TRUE(out.finished) << out.failure;
   EXPECT_EQ(out.rejected, 0);
   EXPECT_LE(out.iterations, 6 * 300);
@@ -247,6 +251,12 @@ TEST(Rounding, IsToldWhereItHidesTheAnswer) {
   EXPECT_FALSE(out.finished);
   for (const char *words : {"rod 'wire'", "rounding", "20000 edges", "fewer"}) EXPECT_NE(out.failure.find(words), std::string::npos) << out.failure;
   EXPECT_EQ(out.failure.find("iteration limit"), std::string::npos) << out.failure; // seen to be hopeless before
+  LoopSettings steps = dynamics(1e-3, 0.3);
+  steps.rounding_tolerance = 1e-16;
+  const Outcome thread = run(lightThread(), steps);
+  EXPECT_FALSE(thread.finished);
+  EXPECT_NE(thread.failure.find("lost in rounding"), std::string::npos) << thread.failure;
+  EXPECT_EQ(thread.failure.find("iteration limit"), std::string::npos) << thread.failure;
 }
 
 /// A scene of random proportions, drawn with some edges or with more of them, here or elsewhere.
