@@ -251,12 +251,12 @@ TEST(Rounding, IsToldWhereItHidesTheAnswer) {
   EXPECT_FALSE(out.finished);
   for (const char *words : {"rod 'wire'", "rounding", "20000 edges", "fewer"}) EXPECT_NE(out.failure.find(words), std::string::npos) << out.failure;
   EXPECT_EQ(out.failure.find("iteration limit"), std::string::npos) << out.failure; // seen to be hopeless before
-  LoopSettings steps = dynamics(1e-3, 0.3);
+  LoopSettings steps = dynamics(0.01, 0.1);
   steps.rounding_tolerance = 1e-16;
-  const Outcome thread = run(lightThread(), steps);
-  EXPECT_FALSE(thread.finished);
-  EXPECT_NE(thread.failure.find("lost in rounding"), std::string::npos) << thread.failure;
-  EXPECT_EQ(thread.failure.find("iteration limit"), std::string::npos) << thread.failure;
+  const Outcome falling = run(steelRod(100000, true), steps);
+  EXPECT_FALSE(falling.finished);
+  EXPECT_NE(falling.failure.find("lost in rounding"), std::string::npos) << falling.failure;
+  EXPECT_EQ(falling.failure.find("iteration limit"), std::string::npos) << falling.failure;
 }
 
 /// A scene of random proportions, drawn with some edges or with more of them, here or elsewhere.
