@@ -3,6 +3,8 @@
 #include "tendril/model/scene.hpp"
 
 #include <algorithm>
+#include <chrono>
+#include <thread>
 
 namespace tendril {
 namespace {
@@ -56,7 +58,14 @@ Hdf5File Hdf5File::create(const std::string &path) {
   f.path_ = path;
   Hdf5Properties access = H5Pcreate(H5P_FILE_ACCESS);
   H5Pset_libver_bounds(access, H5F_LIBVER_LATEST, H5F_LIBVER_LATEST); // what appending under readers needs
-  f.file_ = checked(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access), path + ": cannot be written; is another run using it?");
+  // Whoever waits for the file looks into it for a moment, which keeps it from being locked; another run stays.
+  constexpr int most_tries = 20;
+  hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
+  for (int k = 1; file < 0 && k < most_tries; ++k) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(25));
+    file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
+  }
+  f.file_ = checked(file, path + ": cannot be written; is another run using it?");
   return f;
 }
 
