@@ -456,7 +456,11 @@ void IncrementalPotential::commit(State &state, RodSet rods) const {
   for (int r = rods.begin; r < rods.end && !step_.isStatic(); ++r) {
     const RodRange &rod = elements_.rods[r];
     const double rate = 1 / step_.dt;
-    for (int i = 0; i < rod.vertices; ++i) state.velocity[rod.first_vertex + i] = iterate_.displacementAt(rod.slot(i), start_) * rate;
+    for (int a = 0; a < 3; ++a) { // plane by plane
+      const double *now = iterate_[C::Plane(C::position + a)] + rod.first_slot, *before = start_[C::Plane(C::position + a)] + rod.first_slot;
+      const double *low = iterate_[C::Plane(C::position_low + a)] + rod.first_slot, *low_before = start_[C::Plane(C::position_low + a)] + rod.first_slot;
+      for (int i = 0; i < rod.vertices; ++i) state.velocity[rod.first_vertex + i][a] = ((now[i] - before[i]) + (low[i] - low_before[i])) * rate;
+    }
     for (int i = 0; i < rod.edges; i += lanes) {
       const Pack spun = spinOver(start_, iterate_, rod.slot(i)) * Pack(rate);
       for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) state.twist_rate[rod.first_edge + i + l] = spun[l];

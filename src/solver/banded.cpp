@@ -109,7 +109,11 @@ template <class T> void BandedFactor::factorGroup(const Group &group, const Band
     else
       return source[0][at] + added(0);
   };
-  auto plain = [&](int plane, int i) { return value(std::size_t(plane) * first.slots + i, [](int) { return 0.0; }); };
+  auto couplesPositions = [](int plane) { return plane == EdgeBlocks::vertex(0, 1) || plane == EdgeBlocks::vertex(0, 2) || plane == EdgeBlocks::vertex(1, 2); };
+  auto plain = [&](int plane, int i) {
+    if (couplesPositions(plane)) return T(0.0);
+    return value(std::size_t(plane) * first.slots + i, [](int) { return 0.0; });
+  };
   // A shift adds to the diagonal of positions and twists; the twist of a cable is no unknown.
   auto rare = [&](int plane, int i) {
     const std::size_t at = std::size_t(plane) * first.slots + i;
@@ -128,7 +132,7 @@ template <class T> void BandedFactor::factorGroup(const Group &group, const Band
   };
   if (first.closed)
     run(Elimination<T, true, decltype(rare)>(first, held, rare, records));
-  else if (shifted || cable)
+  else if (shifted || cable || system.coupled_positions)
     run(Elimination<T, false, decltype(rare)>(first, held, rare, records));
   else
     run(Elimination<T, false, decltype(plain)>(first, held, plain, records));

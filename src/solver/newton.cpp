@@ -91,7 +91,7 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
   DofMap &dofs = potential.dofs();
   work_ = &work;
   if (circulatory_.emplace(potential, set); circulatory_->isNone()) circulatory_.reset();
-  system_ = {&dofs, set, &potential.blocks(), &work.metric, &work.wanted, &work.shift, &work.workspace};
+  system_ = {&dofs, set, &potential.blocks(), &work.metric, &work.wanted, &work.shift, &work.workspace, !potential.scene().rotation.angular_velocity.isZero(0)};
   const bool whole = set.begin == 0 && set.end == dofs.all().end;
   if (whole)
     PetscCall(DMCreateGlobalVector(dofs.dm(), x_.out()));

@@ -25,6 +25,7 @@ struct BandedSystem {
   const std::vector<char> *wanted = nullptr;  ///< per rod of the scene; the others are left out, and a solve gives them zero
   const std::vector<double> *shift = nullptr; ///< per rod of the scene
   BandedWorkspace *workspace = nullptr;
+  bool coupled_positions = true; ///< whether the blocks of vertices have more than a diagonal
 };
 
 class BandedFactor {
