@@ -35,12 +35,14 @@ double NewtonSolver::sizeOf(int r, const Planes &increment) const {
   return std::sqrt(positions / (length * length * rod.vertices) + twists / rod.edges);
 }
 
-/// What the step has moved a rod by so far, as sizeOf.
+/// What the step has moved the vertices of a rod by so far, as sizeOf, less the mean of them all: a rod that flies has not moved for that.
 double NewtonSolver::movedBy(int r) const {
   const RodRange &rod = potential_->elements().rods[r];
   const Configuration &now = potential_->iterate();
   double positions = 0, twists = 0;
-  for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) positions += now.displacementAt(s, potential_->start()).squaredNorm();
+  Vec3 mean = Vec3::Zero();
+  for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) mean += now.displacementAt(s, potential_->start()) / rod.vertices;
+  for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) positions += (now.displacementAt(s, potential_->start()) - mean).squaredNorm();
   for (int s = rod.first_slot; rod.twist && s < rod.edgeEnd(); ++s) twists += now[Configuration::spin][s] * now[Configuration::spin][s];
   const double length = potential_->length(r);
   return std::sqrt(positions / (length * length * rod.vertices) + twists / rod.edges);
@@ -153,7 +155,8 @@ std::string NewtonSolver::roundingMessage(int r, double size) const {
                        (potential_->elements().restLength() + potential_->elements().rods[r].first_slot));
   std::ostringstream text;
   text << std::setprecision(3) << "rod '" << rod.name << "' is lost in rounding: Newton would still move it by " << size
-       << " of its length, the step moves it by " << movedBy(r) << " (-rounding_tolerance " << potential_->rounding_tolerance << "), and the residual does not fall any more";
+       << " of its length, the step moves it by " << movedBy(r) << " (-rounding_tolerance " << potential_->rounding_tolerance
+       << "), and the residual does not fall any more";
   if (longest > 100 * shortest)
     text << "; edge " << edge << " is " << shortest << " m long, the longest " << longest
          << " m: take one of its vertices away, or use edges of more even length";
