@@ -11,8 +11,8 @@ namespace {
 
 /// Above this part of the largest displacement, a difference is not an error of discretisation.
 constexpr double most_difference = 0.3;
-/// Differences below this part of the length tell nothing about branches, whatever the displacement: coordinates have as many digits.
-constexpr double least_difference = 1e-14;
+/// Differences below this part of the length tell nothing about branches, whatever the displacement: Newton's tolerance may leave as much.
+constexpr double least_difference = 1e-6;
 
 constexpr std::pair<const char *, double EnergyBudget::*> energies[] = {
     {"stretch", &EnergyBudget::stretch}, {"bend", &EnergyBudget::bend}, {"twist", &EnergyBudget::twist}, {"gravity", &EnergyBudget::gravity}};

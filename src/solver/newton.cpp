@@ -471,7 +471,7 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
   PetscCall(SNESGetConvergedReason(snes_, &reason));
   failure->clear();
   if (reason > 0) PetscFunctionReturn(0);
-  report_.lost = !lost_.empty();
+  report_.lost = !lost_.empty() && (reason == SNES_DIVERGED_LOCAL_MIN || reason == SNES_DIVERGED_LINE_SEARCH);
   if (report_.lost)
     *failure = lost_;
   else

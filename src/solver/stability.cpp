@@ -126,14 +126,18 @@ PetscErrorCode NewtonSolver::findBucklingMode(bool *found, bool *neutral) {
   *found = false;
   normalise();
   Planes right = soften();
+  double stiff = 0, soft = 0;
   for (int k = 0; k < 100 && !*found; ++k) {
     PetscCall(solveLinear(right, work_->increment));
-    const double stiff = dot(work_->increment, right), soft = dot(work_->increment, soften());
+    stiff = dot(work_->increment, right);
+    soft = dot(work_->increment, soften());
     *neutral = std::abs(soft - stiff) < rounding * std::abs(stiff);
     *found = k >= 5 && stiff < soft && !*neutral;
     normalise();
     right = soften();
   }
+  // Compression that makes up for no mode's stiffness leaves a definite Hessian: its negative pivots are rounding.
+  if (buckles && !*found && !(soft > 0.5 * stiff)) *neutral = true;
   for (int r = rods_.begin; r < rods_.end; ++r) potential_->assembleRod(r, potential_->step().hessian);
   PetscFunctionReturn(0);
 }

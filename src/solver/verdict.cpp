@@ -101,7 +101,8 @@ NewtonSolver::Verdict NewtonSolver::judge(int r, double rtol) {
   }
   double size;
   const bool little = isLittle(r, &size);
-  if (!noise && !little) { // far from an answer residuals rise and fall as they like
+  // Far from an answer residuals rise and fall as they like; without the exact Hessian they fall slowly, and corrections say too little.
+  if (!noise && (!little || potential_->step().hessian != HessianKind::exact)) {
     standstill.best = now;
     standstill.iterations = 0;
     return Verdict::going;
@@ -120,8 +121,8 @@ NewtonSolver::Verdict NewtonSolver::judge(int r, double rtol) {
   return Verdict::lost;
 }
 
-/// At an equilibrium with its Hessian factored: whether what is left of every rod is little. Zero pivots leave motions out of that: then the residual alone
-/// has to be below the tolerance.
+/// At an equilibrium with its Hessian factored: whether what is left of every rod is little. Zero pivots leave motions out of that: then the residual has
+/// to be below the tolerance, too, or at a noise that is little against the loads.
 PetscErrorCode NewtonSolver::verify(bool *little) {
   bool regular = true;
   PetscReal rtol;
@@ -140,7 +141,10 @@ PetscErrorCode NewtonSolver::verify(bool *little) {
     work_->standstill[r].energy = cost;
     const bool here = isLittle(r, &size);
     if (here) work_->left[r] = std::max(work_->left[r], size);
-    if (report_.neutral_pivots > 0 ? excess(work_->residual[r], rtol) <= 1 : here || isNeutral(r)) continue;
+    const IncrementalPotential::Residual &residual = work_->residual[r];
+    const bool met = excess(residual, rtol) <= 1 ||
+                     (here && isAtNoise(residual, rtol) && std::max(residual.force_floor, residual.moment_floor) <= potential_->rounding_tolerance);
+    if (report_.neutral_pivots > 0 ? met : here || isNeutral(r)) continue;
     *little = false;
     lost_ = roundingMessage(r, size);
   }
