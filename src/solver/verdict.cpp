@@ -59,7 +59,7 @@ PetscErrorCode NewtonSolver::findLoadReach() {
   response.setOrigin(loads.equilibrium.origin());
   PetscCall(solveLinear(loads.equilibrium, response));
   for (int r = rods_.begin; r < rods_.end; ++r) {
-    work_->load_reach[r] = sizeOf(r, response);
+    work_->load_reach[r] = std::min(1.0, sizeOf(r, response)); // a linear response beyond the length of the rod says nothing
     work_->load_energy[r] = 0;
     for (int a = 0; a < slot_size; ++a)
       for (int s = dofs.rods()[r].first_slot; s < dofs.rods()[r].vertexEnd(); ++s) work_->load_energy[r] += 0.5 * loads.equilibrium[a][s] * response[a][s];
