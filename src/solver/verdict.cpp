@@ -38,14 +38,12 @@ double NewtonSolver::sizeOf(int r, const Planes &increment) const {
 /// What the step has moved the vertices of a rod by so far, as sizeOf, less the mean of them all: a rod that flies has not moved for that.
 double NewtonSolver::movedBy(int r) const {
   const RodRange &rod = potential_->elements().rods[r];
-  const Configuration &now = potential_->iterate();
-  double positions = 0, twists = 0;
+  Planes &moved = work_->coordinates; // free until the iterate is written
+  potential_->coordinates(moved, {r, r + 1});
   Vec3 mean = Vec3::Zero();
-  for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) mean += now.displacementAt(s, potential_->start()) / rod.vertices;
-  for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) positions += (now.displacementAt(s, potential_->start()) - mean).squaredNorm();
-  for (int s = rod.first_slot; rod.twist && s < rod.edgeEnd(); ++s) twists += now[Configuration::spin][s] * now[Configuration::spin][s];
-  const double length = potential_->length(r);
-  return std::sqrt(positions / (length * length * rod.vertices) + twists / rod.edges);
+  for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) mean += moved.vector(0, s) / rod.vertices;
+  for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) moved.setVector(0, s, moved.vector(0, s) - mean);
+  return sizeOf(r, moved);
 }
 
 /// What the loads would move every rod by, with the matrix factored last.
