@@ -35,6 +35,28 @@ double ArcLength::product(const Point &a, const Point &b) const {
   return sum;
 }
 
+/// Of the positions and twists alone.
+double ArcLength::size(const Point &p) const { return std::sqrt(std::max(0.0, product(p, p) - p.factor * p.factor)); }
+
+/// The largest correction that is little: against what a step, or its load, moves, or against the rounding of the coordinates.
+double ArcLength::allowance(const Point &moved) const {
+  const double by_load = std::min(1.0, load_reach_ * std::abs(solver_.potential().step().load_factor));
+  return std::max(solver_.potential().rounding_tolerance * std::max(size(moved), by_load), rounding_);
+}
+
+/// At the end of a step, with its Hessian factored and the tangent there: whether what Newton would still move it by, across the path, is little.
+PetscErrorCode ArcLength::verify(const Point &direction, bool *little) {
+  PetscFunctionBeginUser;
+  Point rest;
+  PetscCall(solve(solver_.potential().derivatives().gradient, &rest.unknowns));
+  const double along = product(direction, rest);
+  for (std::size_t k = 0; k < rest.unknowns.size(); ++k) rest.unknowns.data()[k] -= along * direction.unknowns.data()[k];
+  rest.factor -= along * direction.factor;
+  left_ = size(rest);
+  *little = left_ <= allowance(last_);
+  PetscFunctionReturn(0);
+}
+
 /// Equilibrium at the load factor the run begins with: rods need not be at rest as drawn.
 PetscErrorCode ArcLength::findStart(State &state) {
   PetscFunctionBeginUser;
@@ -107,7 +129,7 @@ PetscErrorCode ArcLength::iterate(const std::function<double(const Point &moved,
   PetscReal rtol;
   PetscCall(SNESGetTolerances(solver_.snes(), nullptr, &rtol, nullptr, nullptr, nullptr));
   *converged = false;
-  double last = HUGE_VAL, moved_by = 0; // by the last correction, and by all since the start of the step
+  bool little = false; // the last correction, against what the step has moved
   for (int k = 0; k <= most_iterations; ++k) {
     const IncrementalPotential::Residual residual = potential.residual();
     if (!std::isfinite(residual.force) || !std::isfinite(residual.moment)) {
@@ -115,7 +137,7 @@ PetscErrorCode ArcLength::iterate(const std::function<double(const Point &moved,
       PetscFunctionReturn(0);
     }
     // Rounding may keep the residual above its tolerance: then what the last correction moved must be little.
-    *converged = k > 0 && (excess(residual, rtol) <= 1 || (isAtNoise(residual, rtol) && last <= potential.rounding_tolerance * moved_by));
+    *converged = k > 0 && (excess(residual, rtol) <= 1 || (isAtNoise(residual, rtol) && little));
     if (*converged) PetscFunctionReturn(0);
     if (k == most_iterations) break;
     int negative;
@@ -133,8 +155,7 @@ PetscErrorCode ArcLength::iterate(const std::function<double(const Point &moved,
     const double change = constraint(moved, correction, load);
     for (std::size_t k = 0; k < metric_.size(); ++k) correction.unknowns.data()[k] += change * load.unknowns.data()[k];
     correction.factor = change;
-    last = std::sqrt(product(correction, correction));
-    moved_by = std::sqrt(product(moved, moved));
+    little = size(correction) <= allowance(moved);
     ++iterations_;
     if (!move(correction.unknowns, potential.step().load_factor + change)) {
       obstacle_ = "an edge vanishes or turns back on itself";
@@ -251,6 +272,10 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
 
   Point direction;
   PetscCall(tangent(&direction));
+  rounding_ = 0;
+  for (int r = 0; r < potential.all().end; ++r)
+    rounding_ = std::max(rounding_, 4 * std::numeric_limits<double>::epsilon() * std::max(1.0, potential.rodEnergy(potential.iterate(), r).reach / potential.length(r)));
+  load_reach_ = size(direction) / std::abs(direction.factor);
   const double first = settings_.dt / direction.factor; // as long as a load step of dt
   const double shortest = first * (settings_.dt_min > 0 ? settings_.dt_min / settings_.dt : 1.0 / 1024);
   double length = first;
@@ -275,6 +300,15 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
         converged = false;
         obstacle_ = "the path turns too sharply";
       }
+    }
+    bool little = true;
+    if (converged) PetscCall(verify(end, &little));
+    if (!little) {
+      std::ostringstream message;
+      message << "step along the path at factor " << state.time << " is lost in rounding: Newton would still move it by " << left_ << " of the length, it moves "
+              << size(last_) << " (-rounding_tolerance " << potential.rounding_tolerance << "); use fewer edges";
+      failure_ = message.str();
+      PetscFunctionReturn(0);
     }
     // Full load lies before a limit point above it: shorter steps end on the near side.
     if (converged && slope * end.factor < 0 && potential.step().time >= settings_.t_end) {
@@ -306,6 +340,7 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     before = energy;
     row.newton_iterations = iterations_;
     row.negative_pivots = negative_;
+    row.rounding_error = left_;
     row.rejected_steps = std::exchange(rejected, 0);
     row.rejected_iterations = std::exchange(in_vain, 0);
     PetscCall(PetscTime(&now));

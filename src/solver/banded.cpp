@@ -17,7 +17,7 @@ template <class T> const T *as(const double *p) { return reinterpret_cast<const 
 } // namespace
 
 BandedFactor::BandedFactor(const DofMap &dofs, RodSet set, BandedWorkspace &workspace)
-    : dofs_(dofs), rods_(set), order_(set.end - set.begin), held_(order_.size()), negative_(order_.size(), 0), neutral_(order_.size(), 0),
+    : dofs_(dofs), rods_(set), order_(set.end - set.begin), held_(order_.size()), negative_(order_.size(), 0), zero_(order_.size(), 0),
       workspace_(workspace) {
   const auto &rods = dofs.rods();
   std::size_t rows = 0;
@@ -124,11 +124,11 @@ template <class T> void BandedFactor::factorGroup(const Group &group, const Band
   };
   const std::vector<char> &held = held_[group.rod[0] - rods_.begin];
   T *const vertex = as<T>(&workspace_.factors[group.factor]), *const records = vertex + vertex_record;
-  T negative, neutral;
+  T negative, zero;
   auto run = [&](auto elimination) {
     elimination.run(vertex);
     negative = elimination.negative;
-    neutral = elimination.neutral;
+    zero = elimination.zero;
   };
   if (first.closed)
     run(Elimination<T, true, decltype(rare)>(first, held, rare, records));
@@ -139,10 +139,10 @@ template <class T> void BandedFactor::factorGroup(const Group &group, const Band
   for (int l = 0; l < group.count; ++l)
     if constexpr (std::is_same_v<T, Pack>) {
       negative_[group.rod[l] - rods_.begin] = int(negative[l]);
-      neutral_[group.rod[l] - rods_.begin] = int(neutral[l]);
+      zero_[group.rod[l] - rods_.begin] = int(zero[l]);
     } else {
       negative_[group.rod[l] - rods_.begin] = int(negative);
-      neutral_[group.rod[l] - rods_.begin] = int(neutral);
+      zero_[group.rod[l] - rods_.begin] = int(zero);
     }
 }
 
@@ -229,7 +229,7 @@ PetscErrorCode inertia(Mat f, PetscInt *negative, PetscInt *zero, PetscInt *posi
   PetscFunctionBegin;
   for (int r = factorOf(f)->rods().begin; r < factorOf(f)->rods().end; ++r) {
     minus += factorOf(f)->negativePivots(r);
-    none += factorOf(f)->neutralPivots(r);
+    none += factorOf(f)->zeroPivots(r);
   }
   if (negative) *negative = minus;
   if (zero) *zero = none;

@@ -52,18 +52,10 @@ Planes shiftMetric(const Elements &e, const DofMap &dofs) {
   return metric;
 }
 
-/// Sum over the slots of a rod.
-double dot(const RodRange &rod, const Planes &a, const Planes &b) {
-  Pack sum(0.0);
-  for (int k = 0; k < slot_size; ++k)
-    for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) sum += read<Pack>(a[k] + s) * read<Pack>(b[k] + s);
-  return reduce(sum);
-}
-
 } // namespace
 
 NewtonWork::NewtonWork(const IncrementalPotential &potential, int slots)
-    : wanted(potential.all().end, true), shift(wanted.size(), 0), last_shift(shift), negative(wanted.size(), 0), energy(wanted.size()),
+    : wanted(potential.all().end, true), shift(wanted.size(), 0), last_shift(shift), negative(wanted.size(), 0), zero(negative), indefinite(wanted.size(), false), energy(wanted.size()),
       energy_known(wanted.size(), false), residual(wanted.size()), moving(wanted.size(), false), standstill(wanted.size()), left(wanted.size(), 0),
       load_reach(wanted.size(), 0), load_energy(wanted.size(), 0), increment(slot_size, slots), coordinates(increment), trial(slots),
       motion(potential.dofs().makePlanes()), metric(shiftMetric(potential.elements(), potential.dofs())) {}
@@ -127,11 +119,12 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
   else
     PetscCall(dofs.createMatrix(jacobian_.out()));
   PetscCall(SNESSetJacobian(snes_, jacobian_, jacobian_, jacobianCallback, this));
-  if (type && std::string(type) == MATSOLVERMUMPS) { // MUMPS counts pivots only when it looks for null ones
-    PetscBool given;
-    PetscCall(PetscOptionsHasName(nullptr, nullptr, "-mat_mumps_icntl_24", &given));
-    if (!given) PetscCall(PetscOptionsSetValue(nullptr, "-mat_mumps_icntl_24", "1"));
-  }
+  if (type && std::string(type) == MATSOLVERMUMPS) // MUMPS counts pivots only when it looks for null ones; a large pivot leaves their variables out
+    for (const auto &[option, value] : {std::pair("-mat_mumps_icntl_24", "1"), std::pair("-mat_mumps_cntl_5", "1e20")}) {
+      PetscBool given;
+      PetscCall(PetscOptionsHasName(nullptr, nullptr, option, &given));
+      if (!given) PetscCall(PetscOptionsSetValue(nullptr, option, value));
+    }
   PetscFunctionReturn(0);
 }
 
@@ -280,21 +273,21 @@ PetscErrorCode NewtonSolver::readInertia(bool *regular) {
   *regular = failed == PC_NOERROR;
   PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &cholesky));
   fill(work_->negative, 0);
-  report_.neutral_pivots = report_.negative_pivots = 0;
+  fill(work_->zero, 0);
+  report_.zero_pivots = report_.negative_pivots = 0;
   if (!cholesky || !*regular) PetscFunctionReturn(0);
   PetscCall(PCFactorGetMatrix(pc, &factor));
   if (const BandedFactor *banded = banded_ ? bandedFactorOf(factor) : nullptr) {
     for (int r = rods_.begin; r < rods_.end; ++r) {
-      if (work_->wanted[r]) work_->negative[r] = banded->negativePivots(r);
-      report_.negative_pivots += banded->negativePivots(r);
-      report_.neutral_pivots += banded->neutralPivots(r);
+      if (!work_->wanted[r]) continue;
+      report_.negative_pivots += work_->negative[r] = banded->negativePivots(r);
+      report_.zero_pivots += work_->zero[r] = banded->zeroPivots(r);
     }
   } else {
     PetscInt minus, zero, plus;
     PetscCall(MatGetInertia(factor, &minus, &zero, &plus));
-    fill(work_->negative, int(minus));
-    report_.negative_pivots = int(minus);
-    report_.neutral_pivots = int(zero);
+    fill(work_->negative, report_.negative_pivots = int(minus));
+    fill(work_->zero, report_.zero_pivots = int(zero));
   }
   PetscFunctionReturn(0);
 }
@@ -348,7 +341,7 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
   IncrementalPotential::RodEnergy after;
   Standstill &standstill = work_->standstill[r];
   standstill.known = work_->shift[r] == 0 && !work_->moving[r];
-  standstill.blind = report_.neutral_pivots > 0;
+  standstill.partial = work_->zero[r] > 0;
   standstill.energy = slope;
   auto attempt = [&](double length) {
     ++report_.trials;
@@ -385,6 +378,7 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
     *lambda = 0;
     return true;
   }
+  if (*lambda < 0.1) work_->last_shift[r] *= 16; // a shift that leaves too long a step is too small
   // A full step that gained clearly more than a quadratic would: the minimum lies beyond, as on the way down from a barrier.
   const double gain = (after.value - before.value) / slope;
   if (!free && *lambda == 1 && gain > 0.6 && gain < 1 && -slope > 1e3 * before.noise) {
@@ -410,7 +404,9 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   PetscCall(SNESLineSearchSetReason(search, SNES_LINESEARCH_SUCCEEDED));
   PetscCall(moveTo(x));
   PetscCall(readInertia(&regular));
-  if (seek_ == Seek::minimum && (report_.negative_pivots > 0 || !regular)) PetscCall(makeDescent(f, y, regular));
+  bool indefinite = false;
+  if (seek_ == Seek::minimum) PetscCall(findIndefinite(y, regular, &indefinite));
+  if (indefinite) PetscCall(makeDescent(f, y, regular));
   if (std::any_of(work_->moving.begin() + rods_.begin, work_->moving.begin() + rods_.end, [](char m) { return m; })) PetscCall(includeMotion(y));
   PetscCall(potential_->dofs().scatter(y, rods_, work_->increment));
   if (circulatory_) PetscCall(includeCirculation(&regular));
@@ -587,7 +583,7 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
     bool left = false, neutral = false;
     if (negative > 0 && k < 10) PetscCall(escapeSaddle(&left, &neutral));
     if (neutral && !left) {
-      report_.neutral_pivots += negative;
+      report_.zero_pivots += negative;
       report_.negative_pivots = 0;
       if (k == 0) report_.first_negative_pivots = 0;
       break;

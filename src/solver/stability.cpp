@@ -6,6 +6,40 @@
 
 namespace tendril {
 
+/// Rods whose Hessian gives no way down as it is: with negative pivots, or with zero ones where forces act on the motions that they leave out. `y`:
+/// Newton's direction.
+PetscErrorCode NewtonSolver::findIndefinite(Vec y, bool regular, bool *any) {
+  constexpr double little = 1e-3; // of the forces
+  PetscFunctionBeginUser;
+  bool scattered = false;
+  *any = false;
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    char &indefinite = work_->indefinite[r];
+    indefinite = work_->wanted[r] && (work_->negative[r] > 0 || !regular);
+    if (work_->wanted[r] && !indefinite && work_->zero[r] > 0 && !isAtNoise(work_->residual[r], 0)) {
+      if (!scattered) PetscCall(potential_->dofs().scatter(y, rods_, work_->increment));
+      scattered = true;
+      const RodRange &rod = potential_->elements().rods[r];
+      const Planes &gradient = potential_->derivatives({r, r + 1}).gradient;
+      Planes &rest = work_->coordinates; // free until the iterate is written
+      for (int a = 0; a < slot_size; ++a) std::fill(rest[a] + rod.first_slot, rest[a] + rod.vertexEnd() + 2, 0.0);
+      potential_->blocks().multiply(rod, work_->increment, rest);
+      potential_->dofs().fold(rod, rest);
+      const double *freedom = potential_->elements().freedom();
+      double forces = 0, out_of_balance = 0;
+      for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
+        for (int a = 0; a < slot_size; ++a) {
+          const double weight = a < 3 ? freedom[s] : rod.twist ? 1 / std::pow(potential_->length(r), 2) : 0;
+          forces += weight * std::pow(gradient[a][s], 2);
+          out_of_balance += weight * std::pow(gradient[a][s] - rest[a][s], 2);
+        }
+      indefinite = out_of_balance > little * little * forces;
+    }
+    *any = *any || indefinite;
+  }
+  PetscFunctionReturn(0);
+}
+
 /// Direction for an indefinite Hessian. A few negative pivots mean a state near a branching: a shifted diagonal keeps most of Newton's speed there.
 /// Many mean compressed edges: then their compression is left out of the Hessian, and the diagonal shifted only if that is not enough.
 /// In statics an equilibrium of couples need not be a minimum of anything: there Newton's own direction stands.
@@ -45,14 +79,14 @@ double NewtonSolver::firstShift(int r) const {
   return stiffness / (m.linear_density * length * length);
 }
 
-/// Adds multiples of the metric to the Hessians of rods with negative pivots until there are none, so that the step goes downhill. Starts near
+/// Adds multiples of the metric to the indefinite Hessians until all pivots are positive, so that the step goes downhill. Starts near
 /// the last shift that was needed, so that a run of indefinite iterates costs one extra factorisation each.
 PetscErrorCode NewtonSolver::shiftUntilPositive(bool regular) {
   PetscFunctionBeginUser;
   for (int attempt = 0; attempt < 40; ++attempt) {
     bool any = false;
     for (int r = rods_.begin; r < rods_.end; ++r) {
-      if (!work_->wanted[r] || (work_->negative[r] == 0 && regular)) continue;
+      if (!work_->indefinite[r] || (work_->negative[r] + work_->zero[r] == 0 && regular)) continue;
       double &shift = work_->shift[r];
       shift = shift > 0 ? 8 * shift : work_->last_shift[r] > 0 ? 0.25 * work_->last_shift[r] : firstShift(r);
       work_->last_shift[r] = shift;
@@ -77,14 +111,11 @@ PetscErrorCode NewtonSolver::findBucklingMode(bool *found, bool *neutral) {
   const DofMap &dofs = potential_->dofs();
   const Elements &e = potential_->elements();
   EdgeBlocks softening = potential_->derivatives(rods_).blocks;
-  auto weighted = [&](const Planes &a, const Planes &b, const Planes *weight) {
+  auto sum = [&](const Planes &a, const Planes &b) {
     double sum = 0;
-    for (int r = rods_.begin; r < rods_.end; ++r)
-      for (int k = 0; k < slot_size; ++k)
-        for (int s = e.rods[r].first_slot; s < e.rods[r].vertexEnd(); ++s) sum += (weight ? (*weight)[k][s] : 1.0) * a[k][s] * b[k][s];
+    for (int r = rods_.begin; r < rods_.end; ++r) sum += dot(e.rods[r], a, b);
     return sum;
   };
-  auto dot = [&](const Planes &a, const Planes &b) { return weighted(a, b, nullptr); };
   // A fixed start without symmetry: the same on every machine, orthogonal to no mode of interest.
   work_->increment.clear();
   for (int r = rods_.begin; r < rods_.end; ++r) {
@@ -103,6 +134,7 @@ PetscErrorCode NewtonSolver::findBucklingMode(bool *found, bool *neutral) {
     softening.subtractFrom(potential_->blocks());
   else {
     for (int r = rods_.begin; r < rods_.end; ++r) potential_->assembleRod(r, HessianKind::exact);
+    fill(work_->indefinite, true);
     PetscCall(shiftUntilPositive(false));
   }
   // With A v = b solved, v'K v = v'b - v'(A - K)v: the stiff part of A never enters, whose rounding would hide a small curvature.
@@ -120,7 +152,11 @@ PetscErrorCode NewtonSolver::findBucklingMode(bool *found, bool *neutral) {
     return y;
   };
   auto normalise = [&] {
-    const double norm = std::sqrt(weighted(work_->increment, work_->increment, &work_->metric));
+    Planes heavy = work_->increment;
+    for (int r = rods_.begin; r < rods_.end; ++r)
+      for (int k = 0; k < slot_size; ++k)
+        for (int s = e.rods[r].first_slot; s < e.rods[r].vertexEnd(); ++s) heavy[k][s] *= work_->metric[k][s];
+    const double norm = std::sqrt(sum(work_->increment, heavy));
     for (double &d : work_->increment) d /= norm;
   };
   *found = false;
@@ -129,9 +165,11 @@ PetscErrorCode NewtonSolver::findBucklingMode(bool *found, bool *neutral) {
   double stiff = 0, soft = 0;
   for (int k = 0; k < 100 && !*found; ++k) {
     PetscCall(solveLinear(right, work_->increment));
-    stiff = dot(work_->increment, right);
-    soft = dot(work_->increment, soften());
-    *neutral = std::abs(soft - stiff) < rounding * std::abs(stiff);
+    stiff = sum(work_->increment, right);
+    soft = sum(work_->increment, soften());
+    double noise = rounding * std::abs(stiff);
+    for (int r = rods_.begin; r < rods_.end; ++r) noise += hessianNoise(r, work_->increment);
+    *neutral = std::abs(soft - stiff) <= noise;
     *found = k >= 5 && stiff < soft && !*neutral;
     normalise();
     right = soften();

@@ -101,7 +101,7 @@ void NewtonReport::include(const NewtonReport &block) {
   trials += block.trials;
   shifts += block.shifts;
   negative_pivots += block.negative_pivots;
-  neutral_pivots += block.neutral_pivots;
+  zero_pivots += block.zero_pivots;
   first_negative_pivots += block.first_negative_pivots;
   escapes += block.escapes;
   residual.include(block.residual);

@@ -57,10 +57,9 @@ PetscErrorCode NewtonSolver::findLoadReach() {
   response.setOrigin(loads.equilibrium.origin());
   PetscCall(solveLinear(loads.equilibrium, response));
   for (int r = rods_.begin; r < rods_.end; ++r) {
-    work_->load_reach[r] = std::min(1.0, sizeOf(r, response)); // a linear response beyond the length of the rod says nothing
-    work_->load_energy[r] = 0;
-    for (int a = 0; a < slot_size; ++a)
-      for (int s = dofs.rods()[r].first_slot; s < dofs.rods()[r].vertexEnd(); ++s) work_->load_energy[r] += 0.5 * loads.equilibrium[a][s] * response[a][s];
+    const double reach = sizeOf(r, response), counted = std::min(1.0, reach); // a linear response beyond the length of the rod says nothing
+    work_->load_reach[r] = counted;
+    work_->load_energy[r] = reach > 0 ? 0.5 * dot(dofs.rods()[r], loads.equilibrium, response) * std::pow(counted / reach, 2) : 0;
   }
   PetscFunctionReturn(0);
 }
@@ -78,12 +77,15 @@ bool NewtonSolver::isLittle(int r, double *size) {
   return *size <= tolerance * std::max(movedBy(r), work_->load_reach[r]) && cost <= tolerance * tolerance * std::max(energy.size, work_->load_energy[r]);
 }
 
+/// What rounding may change v'K v by, with K as it is assembled.
+double NewtonSolver::hessianNoise(int r, const Planes &v) const { return 64 * epsilon * potential_->blocks().magnitude(potential_->elements().rods[r], v); }
+
 /// Whether the last increment of a rod in statics costs no more energy than the rounding of its Hessian: a turn of a round rod about an axis, say, of which
 /// neither the forces nor the stiffness are known.
 bool NewtonSolver::isNeutral(int r) {
-  const RodRange &rod = potential_->elements().rods[r];
   if (!potential_->step().isStatic()) return false;
-  return std::abs(work_->standstill[r].energy) <= 64 * epsilon * potential_->derivatives({r, r + 1}).blocks.magnitude(rod, work_->increment);
+  potential_->derivatives({r, r + 1});
+  return std::abs(work_->standstill[r].energy) <= hessianNoise(r, work_->increment);
 }
 
 NewtonSolver::Verdict NewtonSolver::judge(int r, double rtol) {
@@ -109,18 +111,25 @@ NewtonSolver::Verdict NewtonSolver::judge(int r, double rtol) {
   standstill.iterations = falls ? 0 : standstill.iterations + 1;
   const bool stands = standstill.iterations >= patience;
   if (!noise && !stands) return Verdict::going;
-  if (little && !standstill.blind) {
+  if (little && (!standstill.partial || isBalanced(r, rtol))) {
     work_->left[r] = size;
     return Verdict::answer;
   }
   if (!stands) return Verdict::going;
-  if (potential_->step().isStatic() && (standstill.blind || isNeutral(r))) return Verdict::answer; // for verify to judge
+  if (potential_->step().isStatic() && (standstill.partial || isNeutral(r))) return Verdict::answer; // for verify to judge
   lost_ = roundingMessage(r, size);
   return Verdict::lost;
 }
 
-/// At an equilibrium with its Hessian factored: whether what is left of every rod is little. Zero pivots leave motions out of that: then the residual has
-/// to be below the tolerance, too, or at a noise that is little against the loads.
+/// Whether the residual of a rod is below the tolerance, or at a noise that is little against the loads: what is asked of motions that corrections leave
+/// out.
+bool NewtonSolver::isBalanced(int r, double rtol) const {
+  const IncrementalPotential::Residual &residual = work_->residual[r];
+  return excess(residual, rtol) <= 1 ||
+         (isAtNoise(residual, rtol) && std::max(residual.force_floor, residual.moment_floor) <= potential_->rounding_tolerance);
+}
+
+/// At an equilibrium with its Hessian factored: whether what is left of every rod is little.
 PetscErrorCode NewtonSolver::verify(bool *little) {
   bool regular = true;
   PetscReal rtol;
@@ -132,17 +141,11 @@ PetscErrorCode NewtonSolver::verify(bool *little) {
   if (circulatory_) PetscCall(includeCirculation(&regular));
   fill(work_->load_reach, std::nan(""));
   for (int r = rods_.begin; r < rods_.end && regular; ++r) {
-    const RodRange &rod = potential_->elements().rods[r];
-    double cost = 0, size;
-    for (int a = 0; a < slot_size; ++a)
-      for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) cost += gradient[a][s] * work_->increment[a][s];
-    work_->standstill[r].energy = cost;
+    double size;
+    work_->standstill[r].energy = dot(potential_->elements().rods[r], gradient, work_->increment);
     const bool here = isLittle(r, &size);
     if (here) work_->left[r] = std::max(work_->left[r], size);
-    const IncrementalPotential::Residual &residual = work_->residual[r];
-    const bool met = excess(residual, rtol) <= 1 ||
-                     (here && isAtNoise(residual, rtol) && std::max(residual.force_floor, residual.moment_floor) <= potential_->rounding_tolerance);
-    if (report_.neutral_pivots > 0 ? met : here || isNeutral(r)) continue;
+    if ((here || isNeutral(r)) && (work_->zero[r] == 0 || isBalanced(r, rtol))) continue;
     *little = false;
     lost_ = roundingMessage(r, size);
   }

@@ -261,7 +261,7 @@ TEST(ArcLength, StaysOnTheUnstableBranchBeyondABifurcation) {
   Scene scene = column(32, 4);
   scene.rods[0].material.flexural_stiffness = {1, 4}; // one pivot at a time
   const Path path = follow(scene, along(10, 200));
-  EXPECT_EQ(path.end.time, 1);
+  ASSERT_EQ(path.end.time, 1) << path.failure;
   EXPECT_EQ(path.negative.back(), 1);
   EXPECT_EQ(path.negative.front(), 0);
   EXPECT_LT(path.end.position.back().tail<2>().norm(), 1e-9); // straight but for rounding

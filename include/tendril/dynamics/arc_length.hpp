@@ -37,8 +37,14 @@ private:
   Configuration trial_;
   std::string failure_, obstacle_;
   int iterations_ = 0, negative_ = 0;
+  double left_ = 0;       ///< what Newton would still move the end of the last step by, in the positions and twists
+  double load_reach_ = 0; ///< what the whole load would move them by at first, ...
+  double rounding_ = 0;   ///< ... and what rounding of coordinates does
 
   double product(const Point &a, const Point &b) const;
+  double size(const Point &p) const;
+  double allowance(const Point &moved) const;
+  PetscErrorCode verify(const Point &direction, bool *little);
   PetscErrorCode findStart(State &state);
   PetscErrorCode tangent(Point *direction);
   PetscErrorCode solve(const Planes &gradient, Planes *step);

@@ -30,4 +30,12 @@ struct RodSet {
 /// Unknowns of a slot: x, y, z, twist.
 inline constexpr int slot_size = 4;
 
+/// Scalar product over the slots of a rod. Of copies behind a ring one of both must be zero.
+inline double dot(const RodRange &rod, const Planes &a, const Planes &b) {
+  Pack sum(0.0);
+  for (int k = 0; k < slot_size; ++k)
+    for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) sum += read<Pack>(a[k] + s) * read<Pack>(b[k] + s);
+  return reduce(sum);
+}
+
 } // namespace tendril

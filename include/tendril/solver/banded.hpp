@@ -38,9 +38,8 @@ public:
 
   RodSet rods() const { return rods_; }
   int negativePivots(int rod) const { return negative_[rod - rods_.begin]; }
-  /// Pivots lost in rounding (|pivot| within a few epsilon of its diagonal): motions that cost no energy. They are replaced by a small
-  /// positive number, so that a solve does not move along them.
-  int neutralPivots(int rod) const { return neutral_[rod - rods_.begin]; }
+  /// Pivots lost in rounding (|pivot| within a few epsilon of its diagonal): motions that cost no energy. A solve leaves them out.
+  int zeroPivots(int rod) const { return zero_[rod - rods_.begin]; }
   std::size_t bytes() const { return bytes_; }
 
 private:
@@ -56,7 +55,7 @@ private:
   std::vector<int> order_;              ///< rods by shape, the held vertices included
   std::vector<std::vector<char>> held_; ///< per rod and vertex
   std::vector<Group> groups_;
-  std::vector<int> negative_, neutral_;
+  std::vector<int> negative_, zero_;
   BandedWorkspace &workspace_;
   std::size_t bytes_ = 0;
 

@@ -13,13 +13,14 @@ namespace tendril {
 /// Variables of what a rod beyond a vertex stores: the vertex' position and the vector and twist of the edge before it.
 inline constexpr int state_size = 7, edge_at = 3;
 
-/// Pivot of a row with its sign counted. What rounding has left of the numbers that were added to it, `scale`, is no pivot.
-template <class T> T countedPivot(const T &d, const T &scale, T &negative, T &neutral) {
+/// Inverse of the pivot of a row, its sign counted. What rounding has left of the numbers that were added to it, `scale`, is a zero pivot: its variable
+/// is left out, as if held, with the inverse zero.
+template <class T> T inversePivot(const T &d, const T &scale, T &negative, T &zero) {
   using std::abs;
   const auto lost = abs(d) <= T(16 * std::numeric_limits<double>::epsilon()) * scale;
-  neutral += select(lost, T(1.0), T(0.0));
+  zero += select(lost, T(1.0), T(0.0));
   negative += select(!lost && d < T(0.0), T(1.0), T(0.0));
-  return select(lost, select(scale > T(0.0), T(1e-6) * scale, T(1.0)), d);
+  return select(lost, T(0.0), T(1.0) / d);
 }
 
 /// A row over the variables of the state: of one rod in a register, of a pack of rods as so many packs.
@@ -94,10 +95,10 @@ inline constexpr std::size_t vertex_record = 8;
 inline constexpr int below(int r, int c) { return r * (r - 1) / 2 + c; }
 
 /// LDL^T of a small matrix: L, the inverse pivots and their signs. `scale`: of what was added to each diagonal.
-template <int n, class T> void factorSmall(T (&a)[n][n], const T *scale, T *lower, T *inverse, T &negative, T &neutral) {
+template <int n, class T> void factorSmall(T (&a)[n][n], const T *scale, T *lower, T *inverse, T &negative, T &zero) {
 #pragma GCC unroll 4
   for (int p = 0; p < n; ++p) {
-    inverse[p] = T(1.0) / countedPivot(a[p][p], scale[p], negative, neutral);
+    inverse[p] = inversePivot(a[p][p], scale[p], negative, zero);
 #pragma GCC unroll 4
     for (int r = p + 1; r < n; ++r) {
       const T l = a[p][r] * inverse[p];
@@ -145,12 +146,12 @@ public:
       scale[r] = abs(a[r][r]);
     }
     if (!held_[0])
-      factorSmall<3>(a, scale, first, first + 3, negative, neutral);
+      factorSmall<3>(a, scale, first, first + 3, negative, zero);
     else
       std::fill_n(first, 6, T(0.0));
   }
 
-  T negative{0.0}, neutral{0.0};
+  T negative{0.0}, zero{0.0};
 
 private:
   static constexpr int width = Record<T>::width;
@@ -230,7 +231,7 @@ private:
     }
     T *const out = record(i), *const lower = out + Record<T>::lower, *const inverse = out + Record<T>::pivots;
     T l[6], d[edge_size];
-    factorSmall<edge_size>(a, scale, l, d, negative, neutral);
+    factorSmall<edge_size>(a, scale, l, d, negative, zero);
     std::copy_n(l, 6, lower);
     std::copy_n(d, edge_size, inverse);
     reduce(b, l);
@@ -332,7 +333,7 @@ private:
     const T scale = abs(state_[twist][twist]) + abs(own(3, 3, i));
     T *const out = record(i);
     std::fill_n(out, Record<T>::plain, T(0.0));
-    const T inverse = T(1.0) / countedPivot(T(state_[twist][twist] + own(3, 3, i)), scale, negative, neutral);
+    const T inverse = inversePivot(T(state_[twist][twist] + own(3, 3, i)), scale, negative, zero);
     const Row<T> z = b.scaled(inverse);
     for (int k = 0; k < state_size; ++k) next[k].subtract(b[k], z);
     for (int r = 0; r < 3; ++r) out[r * width + r] = T(1.0);

@@ -19,7 +19,7 @@ struct NewtonReport {
   int trials = 0;                   ///< energies of rods evaluated by the line search
   int shifts = 0;                   ///< factorisations repeated with a shifted diagonal
   int negative_pivots = 0;          ///< of the last Hessian, unshifted
-  int neutral_pivots = 0;           ///< motions that cost no energy (solver type banded)
+  int zero_pivots = 0;              ///< motions that cost no energy
   int first_negative_pivots = 0;    ///< at the equilibrium found first, before any escape (statics)
   int escapes = 0;                  ///< saddles left along a direction of negative curvature (statics)
   IncrementalPotential::Residual residual;
@@ -44,7 +44,7 @@ enum class Seek { minimum, equilibrium };
 /// How Newton stands with a rod whose residual does not fall any more.
 struct Standstill {
   bool known = false;     ///< whether the last increment is Newton's own: no shift, no supports on the way
-  bool blind = false;     ///< whether it leaves out motions without stiffness: zero pivots were replaced
+  bool partial = false;   ///< whether it leaves out motions without stiffness, of zero pivots
   double energy = 0;      ///< gradient times that increment [J]
   double best = HUGE_VAL; ///< smallest excess so far
   int iterations = 0;     ///< since it fell by half
@@ -58,7 +58,8 @@ struct NewtonWork {
   void setOrigin(int first_slot);
   std::vector<char> wanted;                            ///< rods that have not converged yet
   std::vector<double> shift, last_shift;               ///< of the diagonal of indefinite Hessians, now and when it was last needed
-  std::vector<int> negative;                           ///< pivots; of all rods together where the linear solver does not tell them apart
+  std::vector<int> negative, zero;                     ///< pivots; of all rods together where the linear solver does not tell them apart
+  std::vector<char> indefinite;                        ///< rods whose Hessian gives no way down as it is
   std::vector<IncrementalPotential::RodEnergy> energy; ///< at the iterate, ...
   std::vector<char> energy_known;                      ///< ... where it has been computed
   std::vector<IncrementalPotential::Residual> residual;
@@ -120,6 +121,7 @@ private:
   PetscErrorCode refill();
   PetscErrorCode refactor();
   PetscErrorCode makeDescent(Vec f, Vec y, bool regular);
+  PetscErrorCode findIndefinite(Vec y, bool regular, bool *any);
   PetscErrorCode shiftUntilPositive(bool regular);
   double firstShift(int rod) const;
   PetscErrorCode includeMotion(Vec y);
@@ -130,7 +132,9 @@ private:
   double sizeOf(int rod, const Planes &increment) const;
   double movedBy(int rod) const;
   bool isLittle(int rod, double *size);
+  double hessianNoise(int rod, const Planes &v) const;
   bool isNeutral(int rod);
+  bool isBalanced(int rod, double rtol) const;
   PetscErrorCode findLoadReach();
   PetscErrorCode verify(bool *little);
   std::string roundingMessage(int rod, double size) const;
