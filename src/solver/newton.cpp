@@ -238,7 +238,7 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
       residual = potential_->residual(r, energyAtIterate(r));
       work_->moving[r] = moving && dot(rod, work_->motion, work_->motion) > 0;
       finite = finite && residual.isFinite();
-      const Verdict verdict = finite && !work_->moving[r] ? judge(r, rtol) : Verdict::going;
+      const Verdict verdict = residual.isFinite() && !work_->moving[r] ? judge(r, rtol) : Verdict::going;
       lost = lost || verdict == Verdict::lost;
       work_->wanted[r] = verdict != Verdict::answer;
       done = done && !work_->wanted[r];

@@ -134,12 +134,13 @@ PetscErrorCode NewtonSolver::verify(bool *little) {
   bool regular = true;
   PetscReal rtol;
   PetscFunctionBeginUser;
-  *little = true;
   PetscCall(SNESGetTolerances(snes_, nullptr, &rtol, nullptr, nullptr, nullptr));
   const Planes &gradient = potential_->derivatives(rods_).gradient;
   PetscCall(solveLinear(gradient, work_->increment));
   if (circulatory_) PetscCall(includeCirculation(&regular));
   fill(work_->load_reach, std::nan(""));
+  if (!regular) lost_ = "the derivative of the couples is singular: what is left of the answer cannot be told";
+  *little = regular;
   for (int r = rods_.begin; r < rods_.end && regular; ++r) {
     double size;
     work_->standstill[r].energy = dot(potential_->elements().rods[r], gradient, work_->increment);
@@ -158,6 +159,8 @@ std::string NewtonSolver::roundingMessage(int r, double size) const {
   const int edge = int(std::find_if(potential_->elements().restLength() + potential_->elements().rods[r].first_slot,
                                     potential_->elements().restLength() + potential_->elements().rods[r].edgeEnd(), [&](double l) { return l == shortest; }) -
                        (potential_->elements().restLength() + potential_->elements().rods[r].first_slot));
+  const auto [k1, k2] = rod.material.flexural_stiffness;
+  const double slenderness = std::min(k1, k2) > 0 ? rod.material.axial_stiffness * length * length / std::min(k1, k2) : 0;
   std::ostringstream text;
   text << std::setprecision(3) << "rod '" << rod.name << "' is lost in rounding: Newton would still move it by " << size
        << " of its length, the step moves it by " << movedBy(r) << " (-rounding_tolerance " << potential_->rounding_tolerance
@@ -165,9 +168,10 @@ std::string NewtonSolver::roundingMessage(int r, double size) const {
   if (longest > 100 * shortest)
     text << "; edge " << edge << " is " << shortest << " m long, the longest " << longest
          << " m: take one of its vertices away, or use edges of more even length";
+  else if (slenderness > 1e15)
+    text << "; its EA L^2/EI is " << slenderness << ": give it a smaller axial_stiffness, or lay it along an axis of the coordinates";
   else
     text << "; its " << rod.edges() << " edges are " << shortest << " m long: use fewer edges";
-  const auto [k1, k2] = rod.material.flexural_stiffness;
   if (std::max(k1, k2) > 1e12 * std::min(k1, k2) && std::min(k1, k2) > 0)
     text << "; its flexural stiffnesses are " << k1 << " and " << k2 << " N m^2: make them less different";
   if (reach > 1e3 * length) text << "; it lies " << reach << " m from the origin: move the scene nearer to it";

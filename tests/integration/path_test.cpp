@@ -19,7 +19,7 @@ double criticalLoad(const std::string &id) {
 
 struct Path {
   std::vector<CriticalPoint> critical;
-  std::vector<double> factor, step;
+  std::vector<double> factor, step, rounding_error;
   std::vector<int> negative;
   std::vector<State> states;
   std::string failure;
@@ -38,6 +38,7 @@ Path follow(const Scene &scene, const LoopSettings &settings) {
   auto observe = [&](const State &state, const Diagnostics &row) {
     path.factor.push_back(row.time);
     path.step.push_back(row.dt);
+    path.rounding_error.push_back(row.rounding_error);
     path.negative.push_back(row.negative_pivots);
     path.states.push_back(state);
     return PetscErrorCode(0);
@@ -168,6 +169,19 @@ TEST(ArcLength, EndsAtFullLoadWhereLoadStepsEnd) {
   for (std::size_t v = 0; v < load.end.position.size(); ++v)
     EXPECT_LT((path.end.position[v] - load.end.position[v]).norm(), 1e-6); // both converged to 1e-6 of the load
   EXPECT_TRUE(path.critical.empty());
+}
+
+/// F L^3/(3 EI) with the discrete beam's 1 + 1/(2 n^2), where rounding keeps the residual above its tolerance.
+TEST(ArcLength, LeavesSmallBendingOfFineRodsRight) {
+  for (const int edges : {200, 2000, 20000}) {
+    Scene scene = clampedScene(straightRod(edges));
+    scene.forces = {{0, edges, Vec3(0, -3e-6, 0)}};
+    const Path path = follow(scene, along(4, 40));
+    ASSERT_EQ(path.end.time, 1);
+    EXPECT_NEAR(path.end.position.back().y() / -1e-6, 1 + 0.5 / edges / edges, 1e-5) << edges;
+    EXPECT_GT(path.rounding_error[0], 0) << edges;
+    EXPECT_LT(*std::max_element(path.rounding_error.begin(), path.rounding_error.end()), 1e-9) << edges; // 1e-3 of what the load moves
+  }
 }
 
 /// Deep circular arch of 215 degrees, clamped at one end and hinged at the other, pushed down at the crown: DaDeppo & Schmidt (1975).

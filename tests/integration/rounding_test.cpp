@@ -258,6 +258,53 @@ TEST(Rounding, DoesNotStopALightThread) {
 }
 
 /// What cannot be solved is refused, with the rod and its edges: nothing that an iteration could do is left after a few.
+/// A wire of steel on one pin, drawn level: it swings down about an axis that nothing holds, and hangs. Nothing holds its turns about itself either.
+TEST(Rounding, LetsAWireOnOnePinHang) {
+  constexpr double young = 2e11;
+  for (const int edges : {10, 100, 1000})
+    for (const double gravity : {9.81, 0.01})
+      for (const bool mixed : {true, false}) {
+        Rod rod = straightRod(edges);
+        rod.material = homogeneousMaterial({SectionShape::circle, {5e-4, 5e-4}}, young, young / 2.6, 7800);
+        Scene scene = clampedScene(rod);
+        scene.supports = {{Support::Kind::pin, 0, 0, {}, {}}};
+        scene.gravity = Vec3(0, -gravity, 0);
+        LoopSettings settings = statics();
+        settings.mixed = mixed;
+        const Outcome out = run(scene, settings);
+        ASSERT_TRUE(out.finished) << edges << " edges: " << out.failure;
+        const double stretch = 7800 * gravity / (2 * young);
+        EXPECT_LT((out.state.position.back() - Vec3(0, -1 - stretch, 0)).norm(), 1e-9) << edges; // 1e-6 of the weight across, over itself
+        EXPECT_LE(out.iterations, 12) << edges << " edges, gravity " << gravity;                  // 4 to 10; creeping along wrong directions took 20
+      }
+}
+
+/// Rods and rings that rest as they are drawn, on one pin, without loads: an answer as they are, though nothing holds two or three of their turns.
+TEST(Rounding, LeavesRodsOnAPinAtRest) {
+  Random random(5);
+  for (int k = 0; k < 40; ++k) {
+    const int edges = std::array{5, 12, 40, 100}[k % 4];
+    const Vec3 direction = random.direction();
+    const bool closed = k % 8 < 4;
+    Rod rod = inextensibleRod((closed ? ringShape(Vec3::Zero(), direction, 0.3, edges) : lineShape(Vec3::Zero(), direction, edges)).points);
+    rod.closed = closed;
+    if (closed) setBishopDirectors(rod);
+    if (k % 3 == 0)
+      rod.material = homogeneousMaterial({SectionShape::rectangle, {0.02, 0.003}}, 1.8e7, 1.8e7 / 2.6, 1000);
+    else
+      rod.material = homogeneousMaterial({SectionShape::circle, {5e-4, 5e-4}}, 2e11, 2e11 / 2.6, 7800);
+    Scene scene = clampedScene(rod);
+    scene.supports = {{Support::Kind::pin, 0, k % edges, {}, {}}};
+    for (const bool mixed : {true, false}) {
+      LoopSettings settings = statics();
+      settings.mixed = mixed;
+      const Outcome out = run(scene, settings);
+      ASSERT_TRUE(out.finished) << k << ": " << out.failure;
+      for (int i = 0; i < scene.rods[0].vertices(); ++i) EXPECT_LT((out.state.position[i] - scene.rods[0].position[i]).norm(), 1e-9) << k;
+    }
+  }
+}
+
 TEST(Rounding, IsToldWhereItHidesTheAnswer) {
   LoopSettings settings = statics();
   settings.rounding_tolerance = 1e-16; // no answer is so good
