@@ -128,6 +128,7 @@ PetscErrorCode ArcLength::iterate(const std::function<double(const Point &moved,
   IncrementalPotential &potential = solver_.potential();
   PetscReal rtol;
   PetscCall(SNESGetTolerances(solver_.snes(), nullptr, &rtol, nullptr, nullptr, nullptr));
+  rtol *= sharpness_;
   *converged = false;
   bool little = false; // the last correction, against what the step has moved
   for (int k = 0; k <= most_iterations; ++k) {
@@ -303,6 +304,12 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     }
     bool little = true;
     if (converged) PetscCall(verify(end, &little));
+    if (!little && sharpness_ > 1e-6) { // a tolerance relative to all loads may be too dull for what they move
+      sharpness_ *= 1e-2;
+      converged = false;
+      obstacle_ = "what Newton would still move it by is not little";
+      little = true;
+    }
     if (!little) {
       std::ostringstream message;
       message << "step along the path at factor " << state.time << " is lost in rounding: Newton would still move it by " << left_ << " of the length, it moves "

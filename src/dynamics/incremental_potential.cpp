@@ -3,6 +3,7 @@
 #include "tendril/energy/edge.hpp"
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 namespace tendril {
@@ -13,15 +14,22 @@ constexpr double epsilon = std::numeric_limits<double>::epsilon();
 /// Rounding of an edge relative to its length: that of the edge itself, and that of the second word of positions.
 double edgeError(double reach, double edge) { return epsilon * (1 + epsilon * reach / edge); }
 
-/// Loads on each rod [N]: its weight and the forces and couples on it.
+/// Loads on each rod [N]: its weight, and the forces and couples on what is free to move.
 std::vector<double> loads(const Scene &scene, const std::vector<double> &length) {
   std::vector<double> load;
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
     const Rod &rod = scene.rods[r];
     double s = rod.gravity ? rod.material.linear_density * length[r] * scene.gravity.norm() : 0;
     s += rod.material.linear_density * length[r] * length[r] * scene.rotation.angular_velocity.squaredNorm();
+    auto held = [&](int vertex) {
+      return std::any_of(scene.supports.begin(), scene.supports.end(),
+                         [&](const Support &support) { return support.rod == int(r) && support.vertex == vertex && support.holdsPosition(); });
+    };
+    std::map<int, Vec3> force; // per vertex: forces that cancel are none
     for (const NodalForce &f : scene.forces)
-      if (f.rod == int(r)) s += f.force.norm();
+      if (f.rod == int(r)) force.try_emplace(f.vertex, Vec3::Zero()).first->second += f.force;
+    for (const auto &[vertex, f] : force)
+      if (!held(vertex)) s += f.norm();
     for (const EdgeMoment &c : scene.moments)
       if (c.rod == int(r)) s += (std::abs(c.torque) + c.moment.norm()) / length[r];
     load.push_back(s);

@@ -58,18 +58,18 @@ double EdgeBlocks::magnitude(const RodRange &rod, const Planes &x) const {
   std::array<double, edge_size> before{};
   for (int i = 0; i < rod.vertices; ++i)
     for (int r = 0; r < 3; ++r)
-      for (int c = r; c < 3; ++c) sum += (r == c ? 1 : 2) * std::abs(entry(rod, vertex(r, c))[i] * x[r][rod.slot(i)] * x[c][rod.slot(i)]);
+      for (int c = r; c < 3; ++c) sum += std::pow((r == c ? 1 : 2) * entry(rod, vertex(r, c))[i] * x[r][rod.slot(i)] * x[c][rod.slot(i)], 2);
   for (int i = 0; i < rod.edges; ++i) {
     std::array<double, edge_size> here{0, 0, 0, x[3][rod.slot(i)]};
     for (int a = 0; a < 3; ++a) here[a] = x[a][rod.slot(i + 1)] - x[a][rod.slot(i)];
     for (int r = 0; r < edge_size; ++r)
       for (int c = 0; c < edge_size; ++c) {
-        if (c >= r) sum += (r == c ? 1 : 2) * std::abs(entry(rod, own(r, c))[i] * here[r] * here[c]);
-        sum += 2 * std::abs(entry(rod, across(r, c))[i] * before[r] * here[c]);
+        if (c >= r) sum += std::pow((r == c ? 1 : 2) * entry(rod, own(r, c))[i] * here[r] * here[c], 2);
+        sum += std::pow(2 * entry(rod, across(r, c))[i] * before[r] * here[c], 2);
       }
     before = here;
   }
-  return sum;
+  return std::sqrt(sum);
 }
 
 } // namespace tendril

@@ -226,7 +226,7 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
   PetscFunctionBeginUser;
   PetscCall(SNESGetTolerances(snes_, nullptr, &rtol, nullptr, &limit, nullptr));
   likely_ = std::sqrt(rtol);
-  rtol *= sharpness_;
+  rtol_ = rtol *= sharpness_;
   report_.iterations = int(iteration);
   const bool moving = potential_->remainingMotion(rods_, work_->motion);
   bool done = true, finite = true, lost = false;
@@ -369,13 +369,14 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
   }
   if (!accepted) {
     double size;
+    *lambda = 0; // where the rod stays
+    if (excess(work_->residual[r], rtol_) <= 1) return true;
     if (!standstill.known) return false;
     if (!isLittle(r, &size) && !isNeutral(r)) {
       if (isAtNoise(work_->residual[r], 0)) lost_ = roundingMessage(r, size);
       return false;
     }
-    standstill.iterations = most_trials; // what energies can tell is spent: the rod stays where it is
-    *lambda = 0;
+    standstill.iterations = most_trials; // what energies can tell is spent
     return true;
   }
   if (*lambda < 0.1) work_->last_shift[r] *= 16; // a shift that leaves too long a step is too small
@@ -452,6 +453,16 @@ void NewtonSolver::focus() {
   work_->setOrigin(potential_->elements().rods[rods_.begin].first_slot);
 }
 
+/// The rod that is farthest from its equilibrium, in words.
+std::string NewtonSolver::farthest() {
+  int worst = rods_.begin;
+  for (int r = rods_.begin; r < rods_.end; ++r)
+    if (work_->wanted[r] && !(excess(work_->residual[r], rtol_) <= excess(work_->residual[worst], rtol_))) worst = r;
+  if (isAtNoise(work_->residual[worst], 0)) return "; " + roundingMessage(worst, sizeOf(worst, work_->increment));
+  const Rod &rod = potential_->scene().rods[worst];
+  return "; rod '" + rod.name + "' of " + std::to_string(rod.edges()) + " edges is farthest from its equilibrium";
+}
+
 /// SNES from the potential's iterate. `failure` is empty when it converged.
 PetscErrorCode NewtonSolver::newton(std::string *failure) {
   SNESConvergedReason reason;
@@ -474,8 +485,7 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
     switch (reason) {
     case SNES_DIVERGED_MAX_IT:
       *failure = "the iteration limit (-snes_max_it) was reached";
-      for (int r = rods_.begin; r < rods_.end; ++r)
-        if (work_->wanted[r] && isAtNoise(work_->residual[r], 0)) *failure += "; " + roundingMessage(r, sizeOf(r, work_->increment));
+      *failure += farthest();
       break;
     case SNES_DIVERGED_LINE_SEARCH:
       *failure = "no step along the search direction lowers the energy";
@@ -582,12 +592,25 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
     }
     bool left = false, neutral = false;
     if (negative > 0 && k < 10) PetscCall(escapeSaddle(&left, &neutral));
-    if (neutral && !left) {
-      report_.zero_pivots += negative;
+    if (neutral && !left) { // no way down, but what loads move along it has to be found
+      bool little;
+      PetscCall(inertiaAtIterate(&negative));
+      PetscCall(verify(&little));
+      report_.zero_pivots += std::max(0, negative);
       report_.negative_pivots = 0;
       if (k == 0) report_.first_negative_pivots = 0;
-      break;
+      if (little) break;
+      if (++rounds == most_rounds) {
+        failure = lost_;
+        report_.lost = true;
+        break;
+      }
+      sharpness_ *= 1e-2;
+      seek_ = Seek::equilibrium; // Newton's own steps: a shift would drown the soft direction
+      PetscCall(newton(&failure));
+      continue;
     }
+    seek_ = seek;
     if (!left) {
       failure = negative < 0 ? "the Hessian cannot be factored" : "the equilibrium is unstable (negative pivots) and no way down from it was found";
       break;

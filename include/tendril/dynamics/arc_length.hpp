@@ -37,6 +37,7 @@ private:
   Configuration trial_;
   std::string failure_, obstacle_;
   int iterations_ = 0, negative_ = 0;
+  double sharpness_ = 1;  ///< of -snes_rtol
   double left_ = 0;       ///< what Newton would still move the end of the last step by, in the positions and twists
   double load_reach_ = 0; ///< what the whole load would move them by at first, ...
   double rounding_ = 0;   ///< ... and what rounding of coordinates does

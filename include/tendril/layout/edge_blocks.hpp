@@ -38,7 +38,7 @@ public:
   /// y += A x for one rod in vertex coordinates (x, y, z, twist of each slot), copies behind a ring included in x and in y.
   void multiply(const RodRange &rod, const Planes &x, Planes &y) const;
 
-  /// Sum of |x_i A_ij x_j| over the entries of one rod: what x'A x is the remainder of, with rounding of an epsilon of it.
+  /// Root of the sum of (x_i A_ij x_j)^2 over the entries of one rod: rounding of the entries, each its own, changes x'A x by an epsilon of it.
   double magnitude(const RodRange &rod, const Planes &x) const;
 
   /// Where the plane of an entry begins in data().

@@ -110,7 +110,7 @@ private:
   PetscObjectState iterate_state_ = 0;     ///< ... and its state when they were written
   NewtonReport report_;
   Seek seek_ = Seek::minimum;
-  double sharpness_ = 1;
+  double sharpness_ = 1, rtol_ = 0; ///< of -snes_rtol, and what is asked for now
   double likely_ = 0; ///< residual from which the next iterate is likely an answer
   std::string lost_;  ///< why the last solve was lost in rounding
 
@@ -137,6 +137,7 @@ private:
   bool isBalanced(int rod, double rtol) const;
   PetscErrorCode findLoadReach();
   PetscErrorCode verify(bool *little);
+  std::string farthest();
   std::string roundingMessage(int rod, double size) const;
   PetscErrorCode findBucklingMode(bool *found, bool *neutral);
   PetscErrorCode escapeSaddle(bool *left, bool *neutral);
