@@ -8,27 +8,10 @@ class MaterialReader {
 public:
   MaterialReader(YamlMap &map, const Overrides &overrides) : map_(map), overrides_(overrides) {}
 
-  bool has(const std::string &key) { return map_.has(key) || overrides_.count(key) > 0; }
-
-  double notNegative(const std::string &key) { return value(key).notNegative(); }
-  double positive(const std::string &key) { return value(key).positive(); }
-  double poisson() {
-    const YamlValue v = value("poisson");
-    const double p = v.number();
-    if (p <= -1 || p > 0.5) v.fail("'poisson' must lie in (-1, 0.5], found " + v.text());
-    return p;
-  }
-
-  std::array<double, 2> pair(const std::string &key) {
-    const YamlValue v = value(key);
-    if (v.isScalar()) {
-      const double k = v.notNegative();
-      return {k, k};
-    }
-    const std::vector<double> list = v.numbers(2);
-    if (list[0] < 0 || list[1] < 0) v.fail("'" + key + "' must not be negative, found [" + std::to_string(list[0]) + ", " + std::to_string(list[1]) + "]");
-    return {list[0], list[1]};
-  }
+  bool has(const Key &key) { return map_.has(key) || overrides_.count(std::string(key.name())) > 0; }
+  bool has(AnyKey key) { return has(*key); }
+  double number(KeyOf<KeyType::number> key) { return value(*key).number(*key); }
+  std::array<double, 2> pair(KeyOf<KeyType::pair> key) { return value(*key).pair(*key); }
 
   const YamlValue &block() const { return map_.value(); }
 
@@ -36,13 +19,13 @@ private:
   YamlMap &map_;
   const Overrides &overrides_;
 
-  YamlValue value(const std::string &key) {
+  YamlValue value(const Key &key) {
     map_.has(key);
-    const auto found = overrides_.find(key);
+    const auto found = overrides_.find(std::string(key.name()));
     if (found == overrides_.end()) return map_.at(key);
-    const std::string option = "option -rod_" + key;
+    const std::string option = "option -rod_" + found->first;
     try {
-      return {YAML::Load(found->second), option, key};
+      return {YAML::Load(found->second), option, found->first};
     } catch (const YAML::Exception &) {
       throw SceneError(option + ": '" + found->second + "' is neither a number nor a list like [1,2]");
     }
@@ -51,26 +34,20 @@ private:
 
 Material readSection(MaterialReader &in) {
   Section section{};
-  const int shapes = int(in.has("radius")) + int(in.has("radii")) + int(in.has("width") || in.has("height"));
-  if (shapes != 1)
+  const bool circle = in.has("rods[].material.radius"), ellipse = in.has("rods[].material.radii");
+  if (int(circle) + int(ellipse) + int(in.has("rods[].material.width") || in.has("rods[].material.height")) != 1)
     in.block().fail("a homogeneous section needs one of 'radius', 'radii: [along the first director, along the second]', or 'width' and 'height'");
-  if (in.has("radius"))
-    section = {SectionShape::circle, {in.positive("radius"), 0}};
-  else if (in.has("radii")) {
-    section = {SectionShape::ellipse, in.pair("radii")};
-    if (section.size[0] == 0 || section.size[1] == 0) in.block().fail("'radii' must be greater than zero");
-  } else
-    section = {SectionShape::rectangle, {in.positive("width"), in.positive("height")}};
-  const double young = in.positive("young");
-  if (in.has("poisson") == in.has("shear"))
-    in.block().fail(std::string("a homogeneous section needs 'poisson' or 'shear', found ") + (in.has("shear") ? "both" : "none"));
-  double shear;
-  if (in.has("shear"))
-    shear = in.positive("shear");
-  else {
-    shear = young / (2 * (1 + in.poisson()));
-  }
-  return homogeneousMaterial(section, young, shear, in.positive("density"));
+  if (circle)
+    section = {SectionShape::circle, {in.number("rods[].material.radius"), 0}};
+  else if (ellipse)
+    section = {SectionShape::ellipse, in.pair("rods[].material.radii")};
+  else
+    section = {SectionShape::rectangle, {in.number("rods[].material.width"), in.number("rods[].material.height")}};
+  const double young = in.number("rods[].material.young");
+  const bool poisson = in.has("rods[].material.poisson"), given = in.has("rods[].material.shear");
+  if (poisson == given) in.block().fail(std::string("a homogeneous section needs 'poisson' or 'shear', found ") + (given ? "both" : "none"));
+  const double shear = given ? in.number("rods[].material.shear") : young / (2 * (1 + in.number("rods[].material.poisson")));
+  return homogeneousMaterial(section, young, shear, in.number("rods[].material.density"));
 }
 
 } // namespace
@@ -79,16 +56,21 @@ Material readMaterial(YamlMap &map, const Overrides &overrides) {
   MaterialReader in(map, overrides);
   Material m;
   bool section = false;
-  for (const char *key : {"radius", "radii", "width", "height", "young", "poisson", "shear", "density"}) section = in.has(key) || section;
+  for (const AnyKey key : {AnyKey("rods[].material.radius"), AnyKey("rods[].material.radii"), AnyKey("rods[].material.width"), AnyKey("rods[].material.height"),
+                           AnyKey("rods[].material.young"), AnyKey("rods[].material.poisson"), AnyKey("rods[].material.shear"), AnyKey("rods[].material.density")})
+    section = in.has(key) || section;
   if (section) m = readSection(in);
   // The stiffness parameters; beside a section they replace what follows from it.
-  if (in.has("linear_density")) m.linear_density = in.positive("linear_density");
-  if (in.has("linear_rotational_inertia")) m.linear_rotational_inertia = in.notNegative("linear_rotational_inertia");
-  if (in.has("axial_stiffness")) m.axial_stiffness = in.positive("axial_stiffness");
-  if (in.has("torsional_stiffness")) m.torsional_stiffness = in.notNegative("torsional_stiffness");
-  if (in.has("flexural_stiffness")) m.flexural_stiffness = in.pair("flexural_stiffness");
-  if (in.has("mass_damping_coefficient")) m.mass_damping_coefficient = in.notNegative("mass_damping_coefficient");
-  if (in.has("stiffness_damping_coefficient")) m.stiffness_damping_coefficient = in.notNegative("stiffness_damping_coefficient");
+  auto replace = [&](KeyOf<KeyType::number> key, double &value) {
+    if (in.has(*key)) value = in.number(key);
+  };
+  replace("rods[].material.linear_density", m.linear_density);
+  replace("rods[].material.linear_rotational_inertia", m.linear_rotational_inertia);
+  replace("rods[].material.axial_stiffness", m.axial_stiffness);
+  replace("rods[].material.torsional_stiffness", m.torsional_stiffness);
+  if (in.has("rods[].material.flexural_stiffness")) m.flexural_stiffness = in.pair("rods[].material.flexural_stiffness");
+  m.mass_damping_coefficient = in.number("rods[].material.mass_damping_coefficient");
+  m.stiffness_damping_coefficient = in.number("rods[].material.stiffness_damping_coefficient");
   map.finish();
   // Sections of 1e-100 or 1e100 m leave the range of numbers.
   for (const double v : {m.linear_density, m.axial_stiffness, 1 + m.linear_rotational_inertia, 1 + m.torsional_stiffness, 1 + m.flexural_stiffness[0],
@@ -97,24 +79,11 @@ Material readMaterial(YamlMap &map, const Overrides &overrides) {
   return m;
 }
 
-const std::vector<std::pair<std::string, std::string>> &rodOverrides() {
-  static const std::vector<std::pair<std::string, std::string>> list{{"radius", "radius of a circular section [m]"},
-                                                                     {"radii", "semi-axes of an elliptic section, e.g. [2e-3,1e-3] [m]"},
-                                                                     {"width", "width of a rectangular section, along the first director [m]"},
-                                                                     {"height", "height of a rectangular section, along the second director [m]"},
-                                                                     {"young", "Young's modulus [Pa]"},
-                                                                     {"poisson", "Poisson's ratio"},
-                                                                     {"shear", "shear modulus [Pa]"},
-                                                                     {"density", "density [kg/m^3]"},
-                                                                     {"linear_density", "mass per length [kg/m]"},
-                                                                     {"linear_rotational_inertia", "rotational inertia about the axis per length [kg m]"},
-                                                                     {"axial_stiffness", "EA [N]"},
-                                                                     {"torsional_stiffness", "GJ [N m^2]"},
-                                                                     {"flexural_stiffness", "EI, one number or [kb1,kb2] [N m^2]"},
-                                                                     {"mass_damping_coefficient", "dissipation proportional to mass [1/s]"},
-                                                                     {"stiffness_damping_coefficient", "dissipation proportional to stiffness [s]"},
-                                                                     {"measure", "strain measure: tan or angle"}};
-  return list;
+std::vector<const Key *> rodOverrides() {
+  std::vector<const Key *> rows;
+  for (const Key &key : keys)
+    if (key.parent() == "rods[].material" || std::string_view(key.path) == "rods[].measure") rows.push_back(&key);
+  return rows;
 }
 
 } // namespace tendril

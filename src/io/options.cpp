@@ -21,137 +21,103 @@ std::string joined(const std::vector<std::string> &words) {
   return text;
 }
 
-/// An option of ours. Where `fallback` begins with a bracket it is a description, not a value.
-struct Entry {
-  std::string name, meaning, fallback;
-};
-
-const std::vector<Entry> &entries() {
-  static const std::vector<Entry> list = [] {
-    std::vector<Entry> l{
-        {"scene", "scene file (YAML)", "(required)"},
-        {"mode", "dynamic: steps in time; static: steps in load to an equilibrium", "(from the scene) dynamic"},
-        {"dt", "time step [s]; chosen where -accuracy is given", "(from the scene) 0.01"},
-        {"integrator", integratorMeanings(), "euler"},
-        {"rho_inf", "generalized_alpha: what is left of the highest frequencies after a step, 0 to 1", "0.8"},
-        {"dt_adapt", "none: steps of -dt; error: as long as the estimated error of a step allows, beginning with -dt (dynamic)", "none"},
-        {"dt_rtol", "-dt_adapt error: error of a step allowed, relative to what it moves", "1e-3"},
-        {"dt_atol", "-dt_adapt error: and in addition, relative to the length of the rod (twists in rad)", "1e-6"},
-        {"dt_max", "-dt_adapt error: largest step [s]", "(none)"},
-        {"dt_min", "smallest step after rejections [s, or load factor]", "(dt/1024)"},
-        {"t_end", "end time [s]", "(from the scene) 1"},
-        {"load_steps", "equal steps of the load factor from 0 to 1 (static)", "(from the scene) 1"},
-        {"continuation", "load: steps of the load factor; arclength: along the path of equilibria, through limit points (static)", "load"},
-        {"arclength_steps", "most steps along the path (-continuation arclength)", "200"},
-        {"bifurcation", "where stability is lost between load steps: off, locate (find the critical load and go on), or stop there (static)", "locate"},
-        {"gravity", "acceleration of gravity, e.g. 0,-9.81,0 [m/s^2]", "(from the scene)"},
-        {"output_dir", "folder for the results", "out"},
-        {"output_interval", "time between frames [s]; steps end at its multiples, shorter than dt where it is no divisor; 0: every step", "0"},
-        {"checkpoint_interval", "steps between checkpoints; 0: only at the end", "0"},
-        {"restart", "checkpoint of the same scene to go on from, to the same bits; the results go to another folder", "(none)"},
-        {"output_fields",
-         "fields of a frame besides the position: all for " + joined(TrajectoryWriter::fieldNames()) + "; by name also " +
-             joined(TrajectoryWriter::derivedFieldNames()),
-         "all"},
-        {"error_estimate",
-         "solve statics again with half the edge length and tell the estimated error; in dynamics tell that in time, where the integrator leaves it", "false"},
-        {"accuracy", "largest relative error: chooses the edges of every rod, and in dynamics -dt (or -dt_rtol and -dt_atol), so that the estimate is below",
-         "(edges from the scene)"},
-        {"accuracy_of",
-         "whose error: position (the largest, over the rod's length), tip (over the rod's length), or energy (elastic); in dynamics root mean square in time",
-         "position"},
-        {"rounding_tolerance", "where rounding stops Newton: what is left of the answer, over what the step or its loads move, at most", "1e-3"},
-        {"retraction", "how positions move: additive (straight), or length (keeping the linearised lengths of the edges)", "length"},
-        {"stretch", "axial force: primal (from the strain), or mixed (an unknown of its own)", "mixed"},
-        {"hessian", "exact, or gauss_newton (without second derivatives of the strains; for comparison)", "exact"},
-    };
-    for (const auto &[name, meaning] : rodOverrides()) l.push_back({"rod_" + name, meaning + ", for every rod", "(from the scene)"});
-    return l;
-  }();
-  return list;
-}
-
 [[noreturn]] void fail(const std::string &option, const std::string &message) { throw SceneError("option -" + option + ": " + message); }
 
-/// Our options as text.
+/// Our options as text, read by the table of keys.
 class Texts {
 public:
   PetscErrorCode read() {
-    char text[PETSC_MAX_PATH_LEN];
-    PetscBool set;
     PetscFunctionBeginUser;
-    PetscOptionsBegin(PETSC_COMM_WORLD, "", "Options of tendril", "docs/user.md");
-    for (const Entry &e : entries()) {
-      PetscCall(PetscOptionsString(("-" + e.name).c_str(), e.meaning.c_str(), "", e.fallback.c_str(), text, sizeof text, &set));
-      if (set) given_[e.name] = text;
-    }
-    PetscOptionsEnd();
-    for (const auto &[name, text_given] : given_)
-      if (text_given.empty() && name != "error_estimate") fail(name, "needs a value");
+    for (const Key &key : keys)
+      if (key.isOption() && std::string_view(key.path).substr(0, 6) != "-snes_") PetscCall(readOne(key.path, key.type == KeyType::flag));
+    for (const Key *key : rodOverrides()) PetscCall(readOne(("-rod_" + std::string(key->name())).c_str(), false));
     PetscFunctionReturn(0);
   }
 
-  bool has(const std::string &name) const { return given_.count(name) > 0; }
-  const std::string &at(const std::string &name) const { return given_.at(name); }
+  bool isGiven(const std::string &option) const { return given_.count(option) > 0; }
+  bool has(AnyKey key) const { return isGiven(key->path); }
+  std::string text(const Key &key) const { return isGiven(key.path) ? given_.at(key.path) : key.hasFallback() ? key.fallback : ""; }
+  std::string text(KeyOf<KeyType::text, KeyType::file> key) const { return text(*key); }
+  const std::string &given(const std::string &option) const { return given_.at(option); }
 
-  /// Given alone, it is true.
-  bool flag(const std::string &name) const {
-    if (at(name).empty()) return true;
-    const std::string word = oneOf(name, {"true", "false", "1", "0"});
-    return word == "true" || word == "1";
+  bool flag(KeyOf<KeyType::flag> key) const {
+    const std::string word = text(*key);
+    if (word.empty() || word == "true" || word == "1") return true; // given alone
+    if (word == "false" || word == "0") return false;
+    fail(*key, "must be true or false, found '" + word + "'");
   }
 
-  double number(const std::string &name) const {
-    const std::vector<double> v = numbers(name);
-    if (v.size() != 1) fail(name, "needs one number, found '" + at(name) + "'");
-    return v[0];
+  double number(KeyOf<KeyType::number> key) const {
+    const std::vector<double> v = numbers(*key);
+    if (v.size() != 1) fail(*key, "needs one number, found '" + text(*key) + "'");
+    return inBounds(*key, v[0]);
   }
 
-  int count(const std::string &name) const {
-    const double n = number(name);
-    if (!(n >= 1 && n <= 1e9 && n == std::floor(n))) fail(name, "must be a whole number of at least 1, found '" + at(name) + "'");
-    return int(n);
+  int integer(KeyOf<KeyType::integer> key) const {
+    const std::vector<double> v = numbers(*key);
+    if (v.size() != 1 || v[0] != std::floor(v[0])) fail(*key, "must be a whole number, found '" + text(*key) + "'");
+    if (v[0] > 1e9) fail(*key, "must be at most 1e9, found '" + text(*key) + "'");
+    return int(inBounds(*key, v[0]));
   }
 
-  double positive(const std::string &name) const {
-    const double value = number(name);
-    if (!(value > 0)) fail(name, "must be greater than zero, found '" + at(name) + "'");
+  Vec3 vector(KeyOf<KeyType::vector> key) const {
+    const std::vector<double> v = numbers(*key);
+    if (v.size() != 3) fail(*key, std::string("needs three numbers, e.g. ") + key->example + "; found '" + text(*key) + "'");
+    return {v[0], v[1], v[2]};
+  }
+
+  std::string word(KeyOf<KeyType::word> key) const {
+    const std::string value = text(*key);
+    const std::vector<std::string> choices = choicesOf(*key);
+    if (std::find(choices.begin(), choices.end(), value) != choices.end()) return value;
+    std::string all;
+    for (const std::string &c : choices) all += (all.empty() ? "" : ", ") + c;
+    const std::string near = closest(value, choices);
+    fail(*key, "must be one of " + all + "; found '" + value + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?"));
+  }
+
+  [[noreturn]] static void fail(const Key &key, const std::string &message) { tendril::fail(std::string(key.name()), message); }
+
+private:
+  std::map<std::string, std::string> given_;
+
+  PetscErrorCode readOne(const char *option, bool flag) {
+    char text[PETSC_MAX_PATH_LEN];
+    PetscBool set;
+    PetscFunctionBeginUser;
+    PetscCall(PetscOptionsGetString(nullptr, nullptr, option, text, sizeof text, &set));
+    if (!set) PetscFunctionReturn(0);
+    if (!*text && !flag) tendril::fail(option + 1, "needs a value");
+    given_[option] = text;
+    PetscFunctionReturn(0);
+  }
+
+  double inBounds(const Key &key, double value) const {
+    if (const std::string wrong = outOfBounds(key, value); !wrong.empty()) fail(key, wrong + ", found '" + text(key) + "'");
     return value;
   }
 
-  std::vector<double> numbers(const std::string &name) const {
+  std::vector<double> numbers(const Key &key) const {
     std::vector<double> values;
-    std::istringstream in(at(name));
+    std::istringstream in(text(key));
     for (std::string word; std::getline(in, word, ',');) {
       std::size_t used = 0;
       double value = 0;
       try {
         value = std::stod(word, &used);
       } catch (const std::exception &) {}
-      if (used == 0 || used != word.size()) fail(name, "'" + word + "' is not a number");
-      if (!std::isfinite(value)) fail(name, "must be finite, found '" + word + "'");
+      if (used == 0 || used != word.size()) fail(key, "'" + word + "' is not a number");
+      if (!std::isfinite(value)) fail(key, "must be finite, found '" + word + "'");
       values.push_back(value);
     }
     return values;
   }
-
-  std::string oneOf(const std::string &name, const std::vector<std::string> &choices) const {
-    const std::string &value = at(name);
-    if (std::find(choices.begin(), choices.end(), value) != choices.end()) return value;
-    std::string all;
-    for (const std::string &c : choices) all += (all.empty() ? "" : ", ") + c;
-    const std::string near = closest(value, choices);
-    fail(name, "must be one of " + all + "; found '" + value + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?"));
-  }
-
-private:
-  std::map<std::string, std::string> given_;
 };
 
 std::set<std::string> readFields(const Texts &texts) {
   const auto &names = TrajectoryWriter::fieldNames(), &derived = TrajectoryWriter::derivedFieldNames();
   std::set<std::string> fields;
-  std::istringstream in(texts.has("output_fields") ? texts.at("output_fields") : "all");
+  std::istringstream in(texts.text("-output_fields"));
   for (std::string word; std::getline(in, word, ',');) {
     if (word == "all")
       fields.insert(names.begin(), names.end());
@@ -180,71 +146,52 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   PetscCall(texts.read());
   PetscCall(PetscOptionsHasName(nullptr, nullptr, "-help", &set));
   o->help = set;
-  if (texts.has("scene")) o->scene = texts.at("scene");
-  if (texts.has("mode")) o->mode = texts.oneOf("mode", {"dynamic", "static"});
-  if (texts.has("dt")) o->dt = texts.positive("dt");
-  if (texts.has("t_end")) o->t_end = texts.positive("t_end");
-  if (texts.has("dt_min")) o->loop.dt_min = texts.positive("dt_min");
-  if (texts.has("integrator")) o->loop.integrator.name = texts.oneOf("integrator", integratorNames());
-  if (texts.has("rho_inf")) {
-    o->loop.integrator.rho_inf = texts.number("rho_inf");
-    if (!(o->loop.integrator.rho_inf >= 0 && o->loop.integrator.rho_inf <= 1)) fail("rho_inf", "must be from 0 to 1, found '" + texts.at("rho_inf") + "'");
-    if (o->loop.integrator.name != "generalized_alpha") fail("rho_inf", "needs -integrator generalized_alpha");
-  }
-  if (texts.has("dt_adapt")) o->loop.adapt = texts.oneOf("dt_adapt", {"none", "error"}) == "error" ? Adaptation::error : Adaptation::none;
-  for (const auto &[name, target] :
-       std::initializer_list<std::pair<const char *, double *>>{{"dt_rtol", &o->loop.dt_rtol}, {"dt_atol", &o->loop.dt_atol}, {"dt_max", &o->loop.dt_max}})
-    if (texts.has(name)) {
-      *target = texts.positive(name);
-      if (o->loop.adapt == Adaptation::none) fail(name, "needs -dt_adapt error");
-    }
+  o->schema = texts.flag("-schema");
+  o->keys = texts.flag("-keys");
+  o->scene = texts.text("-scene");
+  if (texts.has("-mode")) o->mode = texts.word("-mode");
+  if (texts.has("-dt")) o->dt = texts.number("-dt");
+  if (texts.has("-t_end")) o->t_end = texts.number("-t_end");
+  if (texts.has("-dt_min")) o->loop.dt_min = texts.number("-dt_min");
+  o->loop.integrator.name = texts.word("-integrator");
+  o->loop.integrator.rho_inf = texts.number("-rho_inf");
+  if (texts.has("-rho_inf") && o->loop.integrator.name != "generalized_alpha") fail("rho_inf", "needs -integrator generalized_alpha");
+  o->loop.adapt = texts.word("-dt_adapt") == "error" ? Adaptation::error : Adaptation::none;
+  o->loop.dt_rtol = texts.number("-dt_rtol");
+  o->loop.dt_atol = texts.number("-dt_atol");
+  if (texts.has("-dt_max")) o->loop.dt_max = texts.number("-dt_max");
+  for (const char *name : {"dt_rtol", "dt_atol", "dt_max"})
+    if (texts.isGiven(std::string("-") + name) && o->loop.adapt == Adaptation::none) fail(name, "needs -dt_adapt error");
   for (const char *name : {"integrator", "dt_adapt"})
-    if (texts.has(name)) o->dynamic_only = name;
-  if (texts.has("load_steps")) o->given_load_steps = texts.count("load_steps");
-  if (texts.has("arclength_steps")) o->arclength_steps = texts.count("arclength_steps");
-  if (texts.has("continuation")) o->continuation = texts.oneOf("continuation", {"load", "arclength"}) == "load" ? Continuation::load : Continuation::arclength;
-  if (texts.has("bifurcation")) {
-    const std::string b = texts.oneOf("bifurcation", {"off", "locate", "stop"});
-    o->bifurcation = b == "off" ? Bifurcation::off : b == "locate" ? Bifurcation::locate : Bifurcation::stop;
-  }
-  if (texts.has("gravity")) {
-    const std::vector<double> g = texts.numbers("gravity");
-    if (g.size() != 3) fail("gravity", "needs three numbers, e.g. 0,-9.81,0; found '" + texts.at("gravity") + "'");
-    o->gravity = Vec3(g[0], g[1], g[2]);
-  }
-  if (texts.has("output_dir")) o->output_dir = texts.at("output_dir");
-  if (texts.has("output_interval")) {
-    o->output_interval = texts.number("output_interval");
-    o->loop.output_interval = o->output_interval;
-    if (o->output_interval < 0) fail("output_interval", "must not be negative, found '" + texts.at("output_interval") + "'");
-  }
-  if (texts.has("checkpoint_interval")) {
-    if (texts.at("checkpoint_interval") != "0") o->checkpoint_interval = texts.count("checkpoint_interval");
-  }
-  if (texts.has("restart")) o->restart = texts.at("restart");
+    if (texts.isGiven(std::string("-") + name)) o->dynamic_only = name;
+  if (texts.has("-load_steps")) o->given_load_steps = texts.integer("-load_steps");
+  if (texts.has("-arclength_steps")) o->arclength_steps = texts.integer("-arclength_steps");
+  o->loop.arclength_steps = texts.integer("-arclength_steps");
+  o->loop.continuation = texts.word("-continuation") == "load" ? Continuation::load : Continuation::arclength;
+  if (texts.has("-continuation")) o->continuation = o->loop.continuation;
+  const std::string bifurcation = texts.word("-bifurcation");
+  o->loop.bifurcation = bifurcation == "off" ? Bifurcation::off : bifurcation == "locate" ? Bifurcation::locate : Bifurcation::stop;
+  if (texts.has("-bifurcation")) o->bifurcation = o->loop.bifurcation;
+  if (texts.has("-gravity")) o->gravity = texts.vector("-gravity");
+  o->output_dir = texts.text("-output_dir");
+  o->output_interval = o->loop.output_interval = texts.number("-output_interval");
+  o->checkpoint_interval = texts.integer("-checkpoint_interval");
+  o->restart = texts.text("-restart");
   o->fields = readFields(texts);
-  if (texts.has("error_estimate")) o->error_estimate = o->loop.estimate_error = texts.flag("error_estimate");
-  if (texts.has("accuracy_of")) {
-    const std::string q = texts.oneOf("accuracy_of", {"position", "tip", "energy"});
-    o->accuracy_of = q == "tip" ? Quantity::tip : q == "energy" ? Quantity::energy : Quantity::position;
-  }
-  if (texts.has("accuracy")) {
-    o->accuracy = {texts.positive("accuracy"), o->accuracy_of.value_or(Quantity::position)};
-    if (o->accuracy->tolerance >= 1) fail("accuracy", "is relative and must be below 1, e.g. 1e-3; found '" + texts.at("accuracy") + "'");
-  }
-  if (texts.has("rounding_tolerance")) {
-    o->loop.rounding_tolerance = texts.positive("rounding_tolerance");
-    if (o->loop.rounding_tolerance >= 1) fail("rounding_tolerance", "must be below 1, found '" + texts.at("rounding_tolerance") + "'");
-  }
-  if (texts.has("retraction"))
-    o->loop.retraction = texts.oneOf("retraction", {"additive", "length"}) == "additive" ? RetractionKind::additive : RetractionKind::length;
-  if (texts.has("stretch")) o->loop.mixed = texts.oneOf("stretch", {"primal", "mixed"}) == "mixed";
-  if (texts.has("hessian")) o->loop.hessian = texts.oneOf("hessian", {"exact", "gauss_newton"}) == "exact" ? HessianKind::exact : HessianKind::gauss_newton;
-  for (const auto &[name, meaning] : rodOverrides())
-    if (texts.has("rod_" + name)) o->overrides[name] = texts.at("rod_" + name);
+  o->error_estimate = o->loop.estimate_error = texts.flag("-error_estimate");
+  const std::string of = texts.word("-accuracy_of");
+  const Quantity quantity = of == "tip" ? Quantity::tip : of == "energy" ? Quantity::energy : Quantity::position;
+  if (texts.has("-accuracy_of")) o->accuracy_of = quantity;
+  if (texts.has("-accuracy")) o->accuracy = {texts.number("-accuracy"), quantity};
+  o->loop.rounding_tolerance = texts.number("-rounding_tolerance");
+  o->loop.retraction = texts.word("-retraction") == "additive" ? RetractionKind::additive : RetractionKind::length;
+  o->loop.mixed = texts.word("-stretch") == "mixed";
+  o->loop.hessian = texts.word("-hessian") == "exact" ? HessianKind::exact : HessianKind::gauss_newton;
+  for (const Key *key : rodOverrides())
+    if (const std::string name(key->name()); texts.isGiven("-rod_" + name)) o->overrides[name] = texts.given("-rod_" + name);
   PetscReal rtol = 1;
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-snes_rtol", &rtol, nullptr));
-  if (!(rtol > 0 && rtol <= 1)) fail("snes_rtol", "must be above 0 and at most 1: it is relative to the loads of each rod");
+  if (const std::string wrong = outOfBounds(*AnyKey("-snes_rtol"), rtol); !wrong.empty()) fail("snes_rtol", wrong + ": it is relative to the loads of each rod");
   PetscFunctionReturn(0);
 }
 
@@ -263,9 +210,6 @@ void checkAccuracy(const Options &o) {
 
 void resolve(const RunSettings &scene, Options &o) {
   o.loop.dynamic = o.mode.value_or(scene.mode) == "dynamic";
-  o.loop.continuation = o.continuation.value_or(Continuation::load);
-  o.loop.bifurcation = o.bifurcation.value_or(Bifurcation::locate);
-  o.loop.arclength_steps = o.arclength_steps.value_or(o.loop.arclength_steps);
   o.load_steps = o.given_load_steps.value_or(scene.load_steps);
   if (o.loop.dynamic) {
     if (o.given_load_steps) fail("load_steps", "has no meaning in -mode dynamic; use -dt");
@@ -304,8 +248,10 @@ PetscErrorCode refuseUnknownOptions() {
   }
   PetscCall(PetscOptionsLeftRestore(nullptr, &n, &names, &values));
   if (unknown.empty()) PetscFunctionReturn(0);
-  std::vector<std::string> known{"snes_rtol", "snes_max_it", "snes_monitor", "log_view"};
-  for (const Entry &e : entries()) known.push_back(e.name);
+  std::vector<std::string> known{"snes_monitor", "log_view", "options_file"};
+  for (const Key &key : keys)
+    if (key.isOption()) known.emplace_back(key.name());
+  for (const Key *key : rodOverrides()) known.push_back("rod_" + std::string(key->name()));
   const std::string near = closest(unknown, known);
   fail(unknown, "unknown or unused" + (near.empty() ? "" : "; did you mean -" + near + "?") + " (-help lists all options)");
 }

@@ -3,6 +3,7 @@
 #include "tendril/dynamics/arc_length.hpp"
 #include "tendril/dynamics/simulation.hpp"
 #include "tendril/io/checkpoint.hpp"
+#include "tendril/io/keys.hpp"
 #include "tendril/io/options.hpp"
 #include "tendril/io/progress.hpp"
 #include "tendril/solver/events.hpp"
@@ -17,11 +18,6 @@
 
 namespace tendril {
 namespace {
-
-constexpr const char *usage =
-    "tendril: elastic rods. Runs the scene given by -scene and writes a trajectory to -output_dir.\n"
-    "  tendril -scene data/scenes/helix.yaml -dt 5e-3 -t_end 2 -output_dir out/helix\n"
-    "Options of tendril are listed below; -snes_*, -ksp_*, -pc_*, -mat_* and -log_view are PETSc's (add -scene to list them with -help).\n";
 
 /// Whether there was none.
 bool makeFolder(const std::string &folder) {
@@ -188,10 +184,11 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
     const QuietErrors errors;
     if (readOptions(argc, argv, &o)) throw SceneError("command line: " + errors.message());
   }
-  if (o.scene.empty()) {
-    if (o.help) PetscFunctionReturn(0);
-    throw SceneError("option -scene: is required: tendril -scene data/scenes/helix.yaml (-help lists all options)");
+  if (o.schema || o.keys) {
+    std::fputs((o.schema ? schemaAsJson() : keysAsJson()).c_str(), stdout);
+    PetscFunctionReturn(0);
   }
+  if (o.scene.empty()) throw SceneError("option -scene: is required: tendril -scene data/scenes/helix.yaml (-help lists all options)");
   int ranks;
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &ranks));
   if (ranks > 1) throw SceneError("tendril runs on one process, found " + std::to_string(ranks) + "; start it without mpiexec");
@@ -320,7 +317,14 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
 } // namespace
 
 int runMain(int argc, char **argv) {
-  if (PetscInitialize(&argc, &argv, nullptr, usage)) return 1;
+  // Ours before PETSc's, which come only where solvers are set up for a scene.
+  auto given = [&](const char *option) { return std::any_of(argv + 1, argv + argc, [&](const char *word) { return std::string_view(word) == option; }); };
+  if (given("-help") || given("-h") || given("--help")) {
+    std::fputs(helpText().c_str(), stdout);
+    std::fflush(stdout);
+    if (!given("-scene")) return 0;
+  }
+  if (PetscInitialize(&argc, &argv, nullptr, nullptr)) return 1;
   int exit_code = 0;
   try {
     const PetscErrorCode error = [&]() -> PetscErrorCode {

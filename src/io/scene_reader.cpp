@@ -20,40 +20,39 @@ Vec3 unit(const YamlValue &value) {
 std::vector<Polyline> readShape(YamlMap &rod) {
   std::vector<Polyline> shapes;
   int given = 0;
-  if (rod.has("line") && ++given) {
-    YamlMap m(rod.at("line"));
-    shapes = {lineShape(m.at("from").vector(), m.at("to").vector(), m.at("edges").integer(1))};
+  if (rod.has("rods[].line") && ++given) {
+    YamlMap m(rod.at("rods[].line"), "rods[].line");
+    shapes = {lineShape(m.vector("rods[].line.from"), m.vector("rods[].line.to"), m.integer("rods[].line.edges"))};
     m.finish();
   }
-  if (rod.has("ring") && ++given) {
-    YamlMap m(rod.at("ring"));
-    shapes = {ringShape(m.vector("center", Vec3::Zero()), m.has("normal") ? unit(m.at("normal")) : Vec3::UnitZ(), m.at("radius").positive(),
-                        m.at("edges").integer(3))};
+  if (rod.has("rods[].ring") && ++given) {
+    YamlMap m(rod.at("rods[].ring"), "rods[].ring");
+    shapes = {ringShape(m.vector("rods[].ring.center"), unit(m.at("rods[].ring.normal")), m.number("rods[].ring.radius"), m.integer("rods[].ring.edges"))};
     m.finish();
   }
-  if (rod.has("helix") && ++given) {
-    YamlMap m(rod.at("helix"));
+  if (rod.has("rods[].helix") && ++given) {
+    YamlMap m(rod.at("rods[].helix"), "rods[].helix");
     HelixShape h;
-    h.origin = m.vector("origin", Vec3::Zero());
-    h.axis = m.has("axis") ? unit(m.at("axis")) : Vec3::UnitX();
-    h.start = m.has("start") ? unit(m.at("start")) : anyNormal(h.axis);
-    if (std::abs(h.start.dot(h.axis)) > 1e-6) m.at("start").fail("'start' must be normal to 'axis', found a cosine of " + std::to_string(h.start.dot(h.axis)));
-    h.length = m.at("length").positive();
-    h.radius = m.at("radius").positive();
-    h.turns = m.at("turns").number();
-    h.taper = m.has("taper") ? m.at("taper").notNegative() : 0;
-    if (h.taper > 0.5) m.at("taper").fail("'taper' must be at most 0.5: it is taken off both ends");
-    h.edges = m.at("edges").integer(2);
+    h.origin = m.vector("rods[].helix.origin");
+    h.axis = unit(m.at("rods[].helix.axis"));
+    h.start = m.has("rods[].helix.start") ? unit(m.at("rods[].helix.start")) : anyNormal(h.axis);
+    if (std::abs(h.start.dot(h.axis)) > 1e-6)
+      m.at("rods[].helix.start").fail("'start' must be normal to 'axis', found a cosine of " + std::to_string(h.start.dot(h.axis)));
+    h.length = m.number("rods[].helix.length");
+    h.radius = m.number("rods[].helix.radius");
+    h.turns = m.number("rods[].helix.turns");
+    h.taper = m.number("rods[].helix.taper");
+    h.edges = m.integer("rods[].helix.edges");
     shapes = {helixShape(h)};
     m.finish();
   }
-  if (rod.has("points") && ++given) {
+  if (rod.has("rods[].points") && ++given) {
     Polyline p;
-    for (const YamlValue &v : rod.at("points").items()) p.points.push_back(v.vector());
+    for (const YamlValue &v : rod.at("rods[].points").items()) p.points.push_back(v.vector());
     shapes = {p};
   }
-  if (rod.has("file") && ++given) {
-    const YamlValue v = rod.at("file");
+  if (rod.has("rods[].file") && ++given) {
+    const YamlValue v = rod.at("rods[].file");
     const std::filesystem::path path(v.text());
     try {
       shapes = readPolylines(path.is_absolute() ? path.string() : (std::filesystem::path(v.file()).parent_path() / path).string());
@@ -65,9 +64,23 @@ std::vector<Polyline> readShape(YamlMap &rod) {
   return shapes;
 }
 
+void place(const YamlValue &value, std::vector<Polyline> &shapes) {
+  YamlMap map(value, "rods[].place");
+  const double scale = map.number("rods[].place.scale");
+  const Vec3 rotation = map.vector("rods[].place.rotation"), translation = map.vector("rods[].place.translation");
+  map.finish();
+  const double angle = rotation.norm();
+  const Eigen::Matrix3d turn = angle > 0 ? Eigen::Matrix3d(Eigen::AngleAxisd(angle, rotation / angle)) : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
+  auto placed = [=](const Vec3 &x) { return Vec3(turn * (scale * x) + translation); };
+  for (Polyline &shape : shapes) {
+    for (Vec3 &x : shape.points) x = placed(x);
+    if (shape.curve) shape.curve = [placed, curve = shape.curve](double s) { return placed(curve(s)); };
+  }
+}
+
 void readDirectors(YamlMap &map, Rod &rod) {
-  if (map.has("directors")) {
-    const YamlValue list = map.at("directors");
+  if (map.has("rods[].directors")) {
+    const YamlValue list = map.at("rods[].directors");
     const auto items = list.items();
     if (int(items.size()) != rod.edges())
       list.fail("'directors' must have one vector per edge (" + std::to_string(rod.edges()) + "), found " + std::to_string(items.size()));
@@ -81,8 +94,8 @@ void readDirectors(YamlMap &map, Rod &rod) {
     return;
   }
   Vec3 start = Vec3::Zero();
-  if (map.has("director")) {
-    const YamlValue v = map.at("director");
+  if (map.has("rods[].director")) {
+    const YamlValue v = map.at("rods[].director");
     start = unit(v);
     const double cosine = start.dot(rod.edge(0).normalized());
     if (std::abs(cosine) > 1e-6)
@@ -95,25 +108,21 @@ void readDirectors(YamlMap &map, Rod &rod) {
 bool isNamed(const Rod &rod, const std::string &name) { return rod.name == name || rod.name.rfind(name + ".", 0) == 0 || rod.name.rfind(name + "#", 0) == 0; }
 
 void readNatural(YamlMap &map, Rod &rod) {
-  if (!map.has("natural")) return;
-  const YamlValue v = map.at("natural");
+  const YamlValue v = map.at("rods[].natural");
   if (v.isMap()) {
-    YamlMap m(v);
+    YamlMap m(v, "rods[].natural");
     rod.natural = Rod::Natural::given;
-    if (m.has("curvature")) {
-      const std::vector<double> k = m.at("curvature").numbers(2);
-      rod.natural_strain.head<2>() = Eigen::Vector2d(k[0], k[1]);
-    }
-    rod.natural_strain[2] = m.number("twist", 0);
+    const std::array<double, 2> curvature = m.pair("rods[].natural.curvature");
+    rod.natural_strain = Vec3(curvature[0], curvature[1], m.number("rods[].natural.twist"));
     m.finish();
-  } else if (v.oneOf({"as_drawn", "straight"}) == "straight")
+  } else if (map.word("rods[].natural") == "straight")
     rod.natural = Rod::Natural::given;
 }
 
 /// Name of a rod, by which supports and loads may find it without doubt.
 std::string readName(YamlMap &map, const std::vector<Rod> &rods) {
-  if (!map.has("name")) return "rod" + std::to_string(rods.size());
-  const YamlValue v = map.at("name");
+  if (!map.has("rods[].name")) return "rod" + std::to_string(rods.size());
+  const YamlValue v = map.at("rods[].name");
   const std::string name = v.text();
   if (name.empty() || name == "all" || name.find_first_not_of("0123456789") == std::string::npos)
     v.fail("'name' must not be empty, a number or 'all', found '" + name + "'");
@@ -123,39 +132,36 @@ std::string readName(YamlMap &map, const std::vector<Rod> &rods) {
 }
 
 void readRod(const YamlValue &value, const Overrides &overrides, std::vector<Rod> &rods, std::vector<Drawing> &drawings) {
-  YamlMap map(value);
+  YamlMap map(value, "rods");
   const std::string name = readName(map, rods);
-  const std::vector<Polyline> shapes = readShape(map);
+  std::vector<Polyline> shapes = readShape(map);
+  if (map.has("rods[].place")) place(map.at("rods[].place"), shapes);
   Rod common;
-  if (map.has("material")) {
-    YamlMap material(map.at("material"));
-    common.material = readMaterial(material, overrides);
-  } else {
-    YamlMap material(YamlValue(YAML::Load("{}"), value.file(), "material"));
-    common.material = readMaterial(material, overrides);
-  }
-  std::string measure = map.has("measure") ? map.at("measure").oneOf({"tan", "angle"}) : "tan";
+  // Options may say all that a material needs.
+  YamlMap material(map.has("rods[].material") ? map.at("rods[].material") : YamlValue(YAML::Load("{}"), value.file(), "material"), "rods[].material");
+  common.material = readMaterial(material, overrides);
+  std::string measure = map.word("rods[].measure");
   if (const auto o = overrides.find("measure"); o != overrides.end())
-    measure = YamlValue(YAML::Node(o->second), "option -rod_measure", "measure").oneOf({"tan", "angle"});
+    measure = YamlValue(YAML::Node(o->second), "option -rod_measure", "measure").word(*AnyKey("rods[].measure"));
   common.measure = measure == "tan" ? Measure::tan : Measure::angle;
-  common.gravity = !map.has("gravity") || map.at("gravity").boolean();
-  common.initial_velocity = map.vector("velocity", Vec3::Zero());
-  common.initial_turns = map.number("turns", 0);
+  common.gravity = map.flag("rods[].gravity");
+  common.initial_velocity = map.vector("rods[].velocity");
+  common.initial_turns = map.number("rods[].turns");
   readNatural(map, common);
-  const bool closed = map.has("closed") && map.at("closed").boolean();
+  const bool closed = map.flag("rods[].closed");
   int copies = 1;
   Vec3 offset = Vec3::Zero();
-  if (map.has("copies")) {
-    YamlMap m(map.at("copies"));
-    copies = m.at("count").integer(1);
-    offset = m.at("offset").vector();
+  if (map.has("rods[].copies")) {
+    YamlMap m(map.at("rods[].copies"), "rods[].copies");
+    copies = m.integer("rods[].copies.count");
+    offset = m.vector("rods[].copies.offset");
     m.finish();
   }
   double vertices = 0;
   for (const Polyline &shape : shapes) vertices += double(copies) * double(shape.points.size());
   if (vertices > 1e8) value.fail("this makes " + std::to_string(std::int64_t(vertices)) + " vertices; a scene may have 1e8");
   for (const Polyline &shape : shapes)
-    if (shape.closed && map.has("closed") && !closed) map.at("closed").fail("'closed: false' contradicts the shape, which is closed");
+    if (shape.closed && map.has("rods[].closed") && !closed) map.at("rods[].closed").fail("'closed: false' contradicts the shape, which is closed");
   for (int copy = 0; copy < copies; ++copy)
     for (std::size_t k = 0; k < shapes.size(); ++k) {
       Rod rod = common;
@@ -172,11 +178,11 @@ void readRod(const YamlValue &value, const Overrides &overrides, std::vector<Rod
       }
       readDirectors(map, rod);
       if (rod.closed && rod.initial_turns != std::round(rod.initial_turns))
-        map.at("turns").fail("'turns' of a closed rod must be a whole number, or its ends do not meet");
-      if (rod.material.isCable() && rod.initial_turns != 0) map.at("turns").fail("a rod without flexural stiffness has no twist");
+        map.at("rods[].turns").fail("'turns' of a closed rod must be a whole number, or its ends do not meet");
+      if (rod.material.isCable() && rod.initial_turns != 0) map.at("rods[].turns").fail("a rod without flexural stiffness has no twist");
       rods.push_back(rod);
       Drawing &drawing = drawings.emplace_back();
-      drawing.directors_given = map.has("directors");
+      drawing.directors_given = map.has("rods[].directors");
       if (rod.closed == shapes[k].closed && shapes[k].curve) // a curve that `closed` closes by one more edge is points to us
         drawing.curve = [curve = shapes[k].curve, shift = Vec3(double(copy) * offset)](double s) { return Vec3(curve(s) + shift); };
     }
@@ -184,13 +190,13 @@ void readRod(const YamlValue &value, const Overrides &overrides, std::vector<Rod
 }
 
 /// Rods a support or load speaks of: a name, a number, or `all`.
-std::vector<int> readTargets(YamlMap &map, const std::vector<Rod> &rods) {
+std::vector<int> readTargets(YamlMap &map, KeyOf<KeyType::rod> key, const std::vector<Rod> &rods) {
   std::vector<int> found;
-  if (!map.has("rod")) {
+  if (!map.has(*key)) {
     if (rods.size() > 1) map.value().fail("say which 'rod' is meant: a name, a number from 0, or all");
     return {0};
   }
-  const YamlValue v = map.at("rod");
+  const YamlValue v = map.at(*key);
   const std::string word = v.text();
   for (std::size_t r = 0; r < rods.size(); ++r) {
     if (word == "all" || isNamed(rods[r], word) || std::to_string(r) == word) found.push_back(int(r));
@@ -199,9 +205,10 @@ std::vector<int> readTargets(YamlMap &map, const std::vector<Rod> &rods) {
   return found;
 }
 
-int readIndex(const YamlValue &v, int count, const std::string &rod) {
+int readIndex(YamlMap &map, KeyOf<KeyType::index> key, int count, const std::string &rod) {
+  const YamlValue v = map.at(*key);
   if (v.isScalar() && v.node().Scalar() == "last") return count - 1;
-  const int i = v.integer(0);
+  const int i = v.integer(*key);
   if (i >= count)
     v.fail("'" + v.name() + "' " + std::to_string(i) + " is out of range: rod '" + rod + "' has " + std::to_string(count) + ", numbered 0 to " +
            std::to_string(count - 1));
@@ -209,15 +216,16 @@ int readIndex(const YamlValue &v, int count, const std::string &rod) {
 }
 
 Motion readMotion(const YamlValue &value) {
-  YamlMap map(value);
+  YamlMap map(value, "supports[].motion");
   Motion m;
-  m.velocity = map.vector("velocity", Vec3::Zero());
-  m.angular_velocity = map.vector("angular_velocity", Vec3::Zero());
-  if (!map.has("velocity") && !map.has("angular_velocity") && !map.has("table"))
+  m.velocity = map.vector("supports[].motion.velocity");
+  m.angular_velocity = map.vector("supports[].motion.angular_velocity");
+  const bool steady = map.has("supports[].motion.velocity") || map.has("supports[].motion.angular_velocity"), table = map.has("supports[].motion.table");
+  if (!steady && !table)
     value.fail("'motion' needs 'velocity' and/or 'angular_velocity', or a 'table'");
-  if (map.has("table")) {
-    if (map.has("velocity") || map.has("angular_velocity")) value.fail("'motion' takes a 'table' or velocities, not both");
-    for (const YamlValue &row : map.at("table").items()) {
+  if (table) {
+    if (steady) value.fail("'motion' takes a 'table' or velocities, not both");
+    for (const YamlValue &row : map.at("supports[].motion.table").items()) {
       const std::size_t n = row.node().size();
       if (n != 4 && n != 7) row.fail("a row of 'table' is [time, dx, dy, dz] or [time, dx, dy, dz, rx, ry, rz]");
       const std::vector<double> v = row.numbers(n);
@@ -232,25 +240,25 @@ Motion readMotion(const YamlValue &value) {
 }
 
 void readSupport(const YamlValue &value, Scene &scene) {
-  YamlMap map(value);
-  const std::string type = map.at("type").oneOf({"clamp", "pin", "fix_twist"});
-  for (const int r : readTargets(map, scene.rods)) {
+  YamlMap map(value, "supports");
+  const std::string type = map.word("supports[].type");
+  for (const int r : readTargets(map, "supports[].rod", scene.rods)) {
     const Rod &rod = scene.rods[r];
     Support s{};
     s.kind = type == "clamp" ? Support::Kind::clamp : type == "pin" ? Support::Kind::pin : Support::Kind::fix_twist;
     s.rod = r;
-    s.vertex = readIndex(map.at("vertex"), rod.vertices(), rod.name);
+    s.vertex = readIndex(map, "supports[].vertex", rod.vertices(), rod.name);
     for (const Support &other : scene.supports)
       if (other.rod == r && other.vertex == s.vertex && ((other.holdsPosition() && s.holdsPosition()) || (other.holdsTwist() && s.holdsTwist())))
         value.fail("vertex " + std::to_string(s.vertex) + " of rod '" + rod.name + "' is held twice");
     s.frame = frameAtVertex(rod, s.vertex);
     if (type != "pin") {
-      s.tangent_given = map.has("tangent");
-      s.director_given = map.has("director");
-      if (s.tangent_given) s.frame.tangent = unit(map.at("tangent"));
+      s.tangent_given = map.has("supports[].tangent");
+      s.director_given = map.has("supports[].director");
+      if (s.tangent_given) s.frame.tangent = unit(map.at("supports[].tangent"));
       s.frame.director = orthonormalised(s.frame.director, s.frame.tangent);
       if (s.director_given) {
-        const YamlValue d = map.at("director");
+        const YamlValue d = map.at("supports[].director");
         const Vec3 v = unit(d);
         if (std::abs(v.dot(s.frame.tangent)) > 1e-6) d.fail("'director' is not normal to the tangent of the support");
         s.frame.director = v;
@@ -258,8 +266,8 @@ void readSupport(const YamlValue &value, Scene &scene) {
       if (!s.frame.director.allFinite()) value.fail("'tangent' is parallel to the rod's director; give a 'director' too");
     }
     if (type == "fix_twist" && rod.material.isCable()) value.fail("rod '" + rod.name + "' has no flexural stiffness and no twist to fix");
-    if (map.has("motion")) {
-      const YamlValue motion = map.at("motion");
+    if (map.has("supports[].motion")) {
+      const YamlValue motion = map.at("supports[].motion");
       s.motion = readMotion(motion);
       const auto turns = [](const Motion::Key &k) { return !k.rotation.isZero(0); };
       const auto travels = [](const Motion::Key &k) { return !k.displacement.isZero(0); };
@@ -275,16 +283,16 @@ void readSupport(const YamlValue &value, Scene &scene) {
 }
 
 void readLoad(const YamlValue &value, Scene &scene) {
-  YamlMap map(value);
-  for (const int r : readTargets(map, scene.rods)) {
+  YamlMap map(value, "loads");
+  for (const int r : readTargets(map, "loads[].rod", scene.rods)) {
     const Rod &rod = scene.rods[r];
-    if (map.has("force")) {
-      scene.forces.push_back({r, readIndex(map.at("vertex"), rod.vertices(), rod.name), map.at("force").vector()});
-    } else if (map.has("torque") || map.has("moment")) {
+    if (map.has("loads[].force")) {
+      scene.forces.push_back({r, readIndex(map, "loads[].vertex", rod.vertices(), rod.name), map.vector("loads[].force")});
+    } else if (map.has("loads[].torque") || map.has("loads[].moment")) {
       if (rod.material.isCable()) value.fail("rod '" + rod.name + "' has no flexural stiffness: it cannot carry a torque or moment");
-      EdgeMoment m{r, readIndex(map.at("edge"), rod.edges(), rod.name), 0, Vec3::Zero()};
-      if (map.has("torque")) m.torque = map.at("torque").number();
-      if (map.has("moment")) m.moment = map.at("moment").vector();
+      EdgeMoment m{r, readIndex(map, "loads[].edge", rod.edges(), rod.name), 0, Vec3::Zero()};
+      if (map.has("loads[].torque")) m.torque = map.number("loads[].torque");
+      if (map.has("loads[].moment")) m.moment = map.vector("loads[].moment");
       scene.moments.push_back(m);
     } else
       value.fail("a load needs 'vertex' and 'force', or 'edge' and 'torque' or 'moment'");
@@ -293,11 +301,11 @@ void readLoad(const YamlValue &value, Scene &scene) {
 }
 
 void readRun(const YamlValue &value, RunSettings &run) {
-  YamlMap map(value);
-  if (map.has("mode")) run.mode = map.at("mode").oneOf({"dynamic", "static"});
-  if (map.has("dt")) run.dt = map.at("dt").positive();
-  if (map.has("t_end")) run.t_end = map.at("t_end").positive();
-  if (map.has("load_steps")) run.load_steps = map.at("load_steps").integer(1);
+  YamlMap map(value, "simulation");
+  run.mode = map.word("simulation.mode");
+  run.dt = map.number("simulation.dt");
+  run.t_end = map.number("simulation.t_end");
+  run.load_steps = map.integer("simulation.load_steps");
   map.finish();
 }
 
@@ -318,14 +326,14 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
   }
   SceneFile out;
   YamlMap map(YamlValue(root, path, "scene"));
-  out.scene.gravity = map.vector("gravity", Vec3(0, -9.81, 0));
+  out.scene.gravity = map.vector("gravity");
   if (map.has("rotation")) {
-    YamlMap rotation(map.at("rotation"));
-    out.scene.rotation.angular_velocity = rotation.at("angular_velocity").vector();
-    out.scene.rotation.centre = rotation.vector("centre", Vec3::Zero());
+    YamlMap rotation(map.at("rotation"), "rotation");
+    out.scene.rotation.angular_velocity = rotation.vector("rotation.angular_velocity");
+    out.scene.rotation.centre = rotation.vector("rotation.centre");
     rotation.finish();
   }
-  if (map.has("simulation")) readRun(map.at("simulation"), out.run);
+  readRun(map.has("simulation") ? map.at("simulation") : YamlValue(YAML::Load("{}"), path, "simulation"), out.run);
   for (const YamlValue &v : map.at("rods").items()) readRod(v, overrides, out.scene.rods, out.drawings);
   if (out.scene.rods.empty()) map.at("rods").fail("a scene needs at least one rod");
   if (map.has("supports"))

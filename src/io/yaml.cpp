@@ -63,24 +63,43 @@ double YamlValue::number() const {
   return value;
 }
 
-double YamlValue::positive() const {
-  const double value = number();
-  if (value <= 0) fail("'" + name_ + "' must be greater than zero, found " + describe(node_));
-  return value;
-}
-
-double YamlValue::notNegative() const {
-  const double value = number();
-  if (value < 0) fail("'" + name_ + "' must not be negative, found " + describe(node_));
-  return value;
-}
-
-int YamlValue::integer(int least, int most) const {
+int YamlValue::integer() const {
   int value;
   if (!node_.IsScalar() || !YAML::convert<int>::decode(node_, value)) fail("'" + name_ + "' must be a whole number, found " + describe(node_));
-  if (value < least || value > most)
-    fail("'" + name_ + "' must be at least " + std::to_string(least) + " and at most " + std::to_string(most) + ", found " + describe(node_));
   return value;
+}
+
+double YamlValue::number(const Key &key) const {
+  const double value = number();
+  if (const std::string wrong = outOfBounds(key, value); !wrong.empty()) fail("'" + name_ + "' " + wrong + ", found " + describe(node_));
+  return value;
+}
+
+int YamlValue::integer(const Key &key) const {
+  const int value = integer();
+  constexpr int most = 10'000'000; // of anything that is counted
+  if (const std::string wrong = outOfBounds(key, value); !wrong.empty()) fail("'" + name_ + "' " + wrong + ", found " + describe(node_));
+  if (value > most) fail("'" + name_ + "' must be at most " + std::to_string(most) + ", found " + describe(node_));
+  return value;
+}
+
+std::array<double, 2> YamlValue::pair(const Key &key) const {
+  if (isScalar()) {
+    const double both = number(key);
+    return {both, both};
+  }
+  const std::vector<double> list = numbers(2);
+  for (const double value : list)
+    if (const std::string wrong = outOfBounds(key, value); !wrong.empty()) fail("'" + name_ + "' " + wrong + ", found " + std::to_string(value));
+  return {list[0], list[1]};
+}
+
+std::string YamlValue::word(const Key &key) const {
+  const std::string value = text();
+  const std::vector<std::string> choices = choicesOf(key);
+  if (std::find(choices.begin(), choices.end(), value) != choices.end()) return value;
+  const std::string near = closest(value, choices);
+  fail("'" + name_ + "' must be one of " + join(choices) + "; found '" + value + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?"));
 }
 
 bool YamlValue::boolean() const {
@@ -106,12 +125,6 @@ Vec3 YamlValue::vector() const {
   return {v[0], v[1], v[2]};
 }
 
-std::string YamlValue::oneOf(const std::vector<std::string> &choices) const {
-  const std::string value = text();
-  if (std::find(choices.begin(), choices.end(), value) == choices.end()) fail("'" + name_ + "' must be one of " + join(choices) + "; found '" + value + "'");
-  return value;
-}
-
 std::vector<YamlValue> YamlValue::items() const {
   if (!node_.IsSequence()) fail("'" + name_ + "' must be a list, found " + describe(node_));
   std::vector<YamlValue> list;
@@ -119,42 +132,78 @@ std::vector<YamlValue> YamlValue::items() const {
   return list;
 }
 
-YamlMap::YamlMap(const YamlValue &value) : value_(value) {
-  if (!value.isMap()) value.fail("'" + value.name() + "' must be a map of keys and values, found " + describe(value.node()));
+YamlMap::YamlMap(const YamlValue &value) : value_(value) { refuseRepeated(); }
+
+YamlMap::YamlMap(const YamlValue &value, KeyOf<KeyType::map, KeyType::list, KeyType::word_or_map> block)
+    : value_(value), path_(std::string(block->path) + (block->type == KeyType::list ? "[]" : "")) {
+  refuseRepeated();
+}
+
+void YamlMap::refuseRepeated() const {
+  if (!value_.isMap()) value_.fail("'" + value_.name() + "' must be a map of keys and values, found " + describe(value_.node()));
   std::map<std::string, int> line;
-  for (const auto &entry : value.node()) {
-    const YamlValue key(entry.first, value.file(), value.name());
-    if (!key.isScalar()) key.fail("a key in '" + value.name() + "' must be a word, found " + describe(entry.first));
+  for (const auto &entry : value_.node()) {
+    const YamlValue key(entry.first, value_.file(), value_.name());
+    if (!key.isScalar()) key.fail("a key in '" + value_.name() + "' must be a word, found " + describe(entry.first));
     const auto [first, fresh] = line.emplace(key.text(), entry.first.Mark().line + 1);
     if (!fresh) key.fail("the key '" + key.text() + "' stands here a second time (first in line " + std::to_string(first->second) + "); keep one of the two");
   }
 }
 
-bool YamlMap::has(const std::string &key) {
-  known_.insert(key);
-  return value_.node()[key].IsDefined();
+/// The name of a key, which has to be one of this block.
+std::string YamlMap::named(const Key &key) {
+  if (key.parent() != path_) throw std::logic_error("the key " + std::string(key.path) + " is not one of " + path_);
+  return *asked_.emplace(key.name()).first;
 }
 
-YamlValue YamlMap::at(const std::string &key) {
-  if (!has(key)) {
-    std::vector<std::string> others;
-    for (const auto &entry : value_.node())
-      if (!known_.count(entry.first.Scalar())) others.push_back(entry.first.Scalar());
-    const std::string near = closest(key, others);
-    value_.fail("'" + value_.name() + "' needs the key '" + key + "'" + (near.empty() ? "" : ", found '" + near + "'"));
-  }
-  return {value_.node()[key], value_.file(), key};
+bool YamlMap::has(const Key &key) { return value_.node()[named(key)].IsDefined(); }
+
+YamlValue YamlMap::at(const Key &key) {
+  const std::string name = named(key);
+  if (has(key)) return {value_.node()[name], value_.file(), name};
+  if (key.hasFallback()) return {YAML::Load(key.fallback), value_.file(), name};
+  std::vector<std::string> others;
+  for (const auto &entry : value_.node())
+    if (!asked_.count(entry.first.Scalar())) others.push_back(entry.first.Scalar());
+  const std::string near = closest(name, others);
+  value_.fail("'" + value_.name() + "' needs the key '" + name + "'" + (near.empty() ? "" : ", found '" + near + "'"));
 }
 
 void YamlMap::finish() const {
+  std::vector<std::string> allowed;
+  for (const Key &key : keys)
+    if (!key.isOption() && key.parent() == path_) allowed.emplace_back(key.name());
   for (const auto &entry : value_.node()) {
-    const std::string key = entry.first.Scalar();
-    if (known_.count(key)) continue;
-    const std::vector<std::string> allowed(known_.begin(), known_.end());
-    const std::string near = closest(key, allowed);
-    YamlValue(entry.first, value_.file(), key)
-        .fail("unknown key '" + key + "' in '" + value_.name() + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") + " Allowed: " + join(allowed));
+    const std::string name = entry.first.Scalar();
+    if (asked_.count(name)) continue;
+    const YamlValue key(entry.first, value_.file(), name);
+    if (std::find(allowed.begin(), allowed.end(), name) != allowed.end()) key.fail("the key '" + name + "' has no meaning in this '" + value_.name() + "'; take it away");
+    const std::string near = closest(name, allowed);
+    key.fail("unknown key '" + name + "' in '" + value_.name() + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") + " Allowed: " + join(allowed));
   }
+}
+
+std::string outOfBounds(const Key &key, double value) {
+  auto text = [](double bound) {
+    std::ostringstream s;
+    s << bound;
+    return s.str();
+  };
+  const Bounds &b = key.bounds;
+  const bool fits = (b.above ? value > b.least : value >= b.least) && (b.below ? value < b.most : value <= b.most);
+  if (fits) return {};
+  if (std::isfinite(b.least) && std::isfinite(b.most))
+    return std::string("must lie in ") + (b.above ? "(" : "[") + text(b.least) + ", " + text(b.most) + (b.below ? ")" : "]");
+  if (std::isfinite(b.most)) return (b.below ? "must be below " : "must be at most ") + text(b.most);
+  if (b.least == 0) return b.above ? "must be greater than zero" : "must not be negative";
+  return (b.above ? "must be greater than " : "must be at least ") + text(b.least);
+}
+
+std::vector<std::string> choicesOf(const Key &key) {
+  std::vector<std::string> choices;
+  std::istringstream in(key.choices);
+  for (std::string word; std::getline(in, word, '|');) choices.push_back(word);
+  return choices;
 }
 
 } // namespace tendril

@@ -11,8 +11,8 @@ namespace tendril {
 /// Parameter name -> text, from the command line; they replace what the scene says of every rod.
 using Overrides = std::map<std::string, std::string>;
 
-/// Parameters that -rod_<parameter> may override, with what each means.
-const std::vector<std::pair<std::string, std::string>> &rodOverrides();
+/// Keys that an option -rod_<key> may override.
+std::vector<const Key *> rodOverrides();
 
 /// \throws SceneError
 Material readMaterial(YamlMap &map, const Overrides &overrides);

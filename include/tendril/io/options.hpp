@@ -13,7 +13,7 @@ namespace tendril {
 /// What is in force in a run: the command line over the scene's `simulation` block.
 struct Options {
   std::string scene; ///< empty when not given
-  bool help = false;
+  bool help = false, schema = false, keys = false;
   std::optional<std::string> mode; ///< these as given; `loop` holds what is in force
   std::optional<double> dt, t_end;
   std::string dynamic_only; ///< an option that was given and means something in dynamics only

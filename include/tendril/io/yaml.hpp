@@ -2,6 +2,7 @@
 /// \file yaml.hpp
 /// Reading YAML with messages a user can act on: every error names file, line, what was found and what may stand there.
 
+#include "tendril/io/keys.hpp"
 #include "tendril/model/scene.hpp"
 
 #include <set>
@@ -21,39 +22,63 @@ public:
   bool isMap() const { return node_.IsMap(); }
   bool isScalar() const { return node_.IsScalar(); }
 
-  double number() const;      ///< finite
-  double positive() const;    ///< finite, > 0
-  double notNegative() const; ///< finite, >= 0
-  int integer(int least, int most = 10'000'000) const;
+  double number() const; ///< finite
+  int integer() const;
   bool boolean() const;
   std::string text() const;
   Vec3 vector() const; ///< three finite numbers
   std::vector<double> numbers(std::size_t count) const;
-  std::string oneOf(const std::vector<std::string> &choices) const;
   std::vector<YamlValue> items() const; ///< of a list
+
+  // By a row of the table of keys: within its bounds, one of its choices.
+  double number(const Key &key) const;
+  int integer(const Key &key) const;
+  std::string word(const Key &key) const;
+  std::array<double, 2> pair(const Key &key) const; ///< one number is both
 
 private:
   YAML::Node node_;
   std::string file_, name_;
 };
 
-/// A YAML map. A key given twice is an error, and so are keys that were never asked for, found by finish().
+/// A YAML map, read by the table of keys: types, bounds, choices and fallbacks are those of the table, and every message names the line. A key given
+/// twice is an error, and so are keys that are not in the table or were never asked for, found by finish().
 class YamlMap {
 public:
+  /// The whole file.
   explicit YamlMap(const YamlValue &value);
-  bool has(const std::string &key);
-  YamlValue at(const std::string &key); ///< required
-  /// Allowed keys beyond those asked for are none: call when all has been read.
+  /// A block of the file, or one entry of a list of blocks.
+  YamlMap(const YamlValue &value, KeyOf<KeyType::map, KeyType::list, KeyType::word_or_map> block);
+
+  bool has(AnyKey key) { return has(*key); }
+  YamlValue at(AnyKey key) { return at(*key); } ///< as it is written, or the fallback; without one the key is required
+  double number(KeyOf<KeyType::number> key) { return at(*key).number(*key); }
+  int integer(KeyOf<KeyType::integer> key) { return at(*key).integer(*key); }
+  bool flag(KeyOf<KeyType::flag> key) { return at(*key).boolean(); }
+  std::string word(KeyOf<KeyType::word, KeyType::word_or_map> key) { return at(*key).word(*key); }
+  Vec3 vector(KeyOf<KeyType::vector> key) { return at(*key).vector(); }
+  std::array<double, 2> pair(KeyOf<KeyType::pair> key) { return at(*key).pair(*key); }
+  /// Call when all has been read.
   void finish() const;
   const YamlValue &value() const { return value_; }
 
-  double number(const std::string &key, double fallback) { return has(key) ? at(key).number() : fallback; }
-  Vec3 vector(const std::string &key, const Vec3 &fallback) { return has(key) ? at(key).vector() : fallback; }
+  bool has(const Key &key);
+  YamlValue at(const Key &key);
 
 private:
   YamlValue value_;
-  std::set<std::string> known_;
+  std::string path_; ///< of the keys in it
+  std::set<std::string> asked_;
+
+  void refuseRepeated() const;
+  std::string named(const Key &key);
 };
+
+/// What is wrong with a number by the bounds of its key, or an empty string.
+std::string outOfBounds(const Key &key, double value);
+
+/// The choices of a key.
+std::vector<std::string> choicesOf(const Key &key);
 
 /// The candidate closest to a misspelt word, or an empty string when none is near.
 std::string closest(const std::string &word, const std::vector<std::string> &candidates);
