@@ -9,9 +9,9 @@
 ///   tendril -options_file options/cases/helix.yaml
 ///   tendril -options_file options/cases/cantilever.yaml -options_file options/dynamics/accurate.yaml
 ///   tendril -options_file options/cases/elastica_accuracy.yaml
-///   tendril -options_file options/cases/twisted_ring.yaml -options_file options/profile.yaml
+///   tendril -options_file options/cases/helix.yaml -options_file options/profile.yaml
 ///   tendril -options_file options/cases/column.yaml
-///   tendril -options_file options/cases/deep_arch.yaml -output_dir out/arch
+///   tendril -options_file options/cases/deep_arch.yaml
 #include "tendril/io/run.hpp"
 
 int main(int argc, char **argv) { return tendril::runMain(argc, argv); }
