@@ -5,11 +5,13 @@
 ///
 ///     clamp |=====o-----o-----o-----o   vertex o: position;  edge -----: director (twist)
 ///
-/// Sample runs:
-///   tendril -scene data/scenes/helix.yaml -output_dir out/helix
-///   tendril -scene data/scenes/cantilever.yaml -rod_young 1e9 -dt 1e-2 -snes_monitor
-///   tendril -scene data/scenes/elastica.yaml -load_steps 4 -output_fields position,director
-///   tendril -scene data/scenes/twisted_ring.yaml -log_view
+/// Sample runs, from the root of the repository; each is a test (options/README.md):
+///   tendril -options_file options/cases/helix.yaml
+///   tendril -options_file options/cases/cantilever.yaml -options_file options/dynamics/accurate.yaml
+///   tendril -options_file options/cases/elastica_accuracy.yaml
+///   tendril -options_file options/cases/helix.yaml -options_file options/profile.yaml
+///   tendril -options_file options/cases/column.yaml
+///   tendril -options_file options/cases/deep_arch.yaml
 #include "tendril/io/run.hpp"
 
 int main(int argc, char **argv) { return tendril::runMain(argc, argv); }

@@ -4,6 +4,7 @@
 #include "tendril/dynamics/simulation.hpp"
 #include "tendril/io/checkpoint.hpp"
 #include "tendril/io/keys.hpp"
+#include "tendril/io/option_files.hpp"
 #include "tendril/io/options.hpp"
 #include "tendril/io/progress.hpp"
 #include "tendril/solver/events.hpp"
@@ -177,7 +178,7 @@ void tellTimeError(const Diagnostics &last, const Options &o, Progress &progress
   writeTimeError(o.output_dir + "/trajectory.h5", with_rounding);
 }
 
-PetscErrorCode execute(int argc, char **argv, int *exit_code) {
+PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, int *exit_code) {
   PetscFunctionBeginUser;
   Options o;
   {
@@ -189,6 +190,8 @@ PetscErrorCode execute(int argc, char **argv, int *exit_code) {
     PetscFunctionReturn(0);
   }
   if (o.scene.empty()) throw SceneError("option -scene: is required: tendril -scene data/scenes/helix.yaml (-help lists all options)");
+  if (const std::string place = files.place("scene"); !place.empty() && !std::filesystem::exists(o.scene))
+    throw SceneError(place + ": the scene '" + o.scene + "' cannot be opened; its path begins in the folder where tendril is started");
   int ranks;
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &ranks));
   if (ranks > 1) throw SceneError("tendril runs on one process, found " + std::to_string(ranks) + "; start it without mpiexec");
@@ -322,7 +325,14 @@ int runMain(int argc, char **argv) {
   if (given("-help") || given("-h") || given("--help")) {
     std::fputs(helpText().c_str(), stdout);
     std::fflush(stdout);
-    if (!given("-scene")) return 0;
+    if (!given("-scene") && !given("-options_file")) return 0;
+  }
+  OptionFiles files;
+  try {
+    files.read(argc, argv);
+  } catch (const SceneError &e) {
+    std::fprintf(stderr, "tendril: %s\n", e.what());
+    return 1;
   }
   if (PetscInitialize(&argc, &argv, nullptr, nullptr)) return 1;
   int exit_code = 0;
@@ -331,14 +341,14 @@ int runMain(int argc, char **argv) {
       PetscFunctionBeginUser;
       PetscCall(registerEvents());
       PetscCall(registerSolvers());
-      PetscCall(execute(argc, argv, &exit_code));
+      PetscCall(execute(argc, argv, files, &exit_code));
       PetscFunctionReturn(0);
     }();
     if (error) exit_code = 1;
   } catch (const std::exception &e) {
     int rank;
     MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
-    if (rank == 0) std::fprintf(stderr, "tendril: %s\n", e.what());
+    if (rank == 0) std::fprintf(stderr, "tendril: %s\n", files.locate(e.what()).c_str());
     exit_code = 1;
   }
   (void)PetscOptionsSetValue(nullptr, "-options_left", "no"); // checked before the first step, with better words

@@ -52,6 +52,21 @@ Planes shiftMetric(const Elements &e, const DofMap &dofs) {
   return metric;
 }
 
+/// MUMPS counts pivots only when it looks for null ones, and a large pivot leaves their variables out. Options of the same
+/// names (options/mumps_inertia.yaml) go before these values: PETSc reads them later.
+PetscErrorCode askMumpsForInertia([[maybe_unused]] PC pc, [[maybe_unused]] Mat matrix) {
+  PetscFunctionBeginUser;
+#if defined(PETSC_HAVE_MUMPS)
+  Mat factor;
+  PetscCall(PCSetOperators(pc, matrix, matrix));
+  PetscCall(PCFactorSetUpMatSolverType(pc));
+  PetscCall(PCFactorGetMatrix(pc, &factor));
+  PetscCall(MatMumpsSetIcntl(factor, 24, 1));
+  PetscCall(MatMumpsSetCntl(factor, 5, 1e20));
+#endif
+  PetscFunctionReturn(0);
+}
+
 } // namespace
 
 NewtonWork::NewtonWork(const IncrementalPotential &potential, int slots)
@@ -119,12 +134,7 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
   else
     PetscCall(dofs.createMatrix(jacobian_.out()));
   PetscCall(SNESSetJacobian(snes_, jacobian_, jacobian_, jacobianCallback, this));
-  if (type && std::string(type) == MATSOLVERMUMPS) // MUMPS counts pivots only when it looks for null ones; a large pivot leaves their variables out
-    for (const auto &[option, value] : {std::pair("-mat_mumps_icntl_24", "1"), std::pair("-mat_mumps_cntl_5", "1e20")}) {
-      PetscBool given;
-      PetscCall(PetscOptionsHasName(nullptr, nullptr, option, &given));
-      if (!given) PetscCall(PetscOptionsSetValue(nullptr, option, value));
-    }
+  if (type && std::string(type) == MATSOLVERMUMPS) PetscCall(askMumpsForInertia(pc, jacobian_));
   PetscFunctionReturn(0);
 }
 

@@ -1,0 +1,28 @@
+#pragma once
+/// \file option_files.hpp
+/// Files of options, looked at before PETSc reads them: PETSc names no lines, and takes the last of a key given twice.
+
+#include <map>
+#include <string>
+#include <vector>
+
+namespace tendril {
+
+/// The files that a command line names by -options_file, and where options stand in them.
+class OptionFiles {
+public:
+  /// \throws SceneError naming file and line
+  void read(int argc, char **argv);
+  /// "file:line" of an option, without its dash; empty where the command line gives it, or nothing does.
+  std::string place(const std::string &option) const;
+  /// The message with the place of the option that it begins with. PETSc's name no option: they get the files.
+  std::string locate(const std::string &message) const;
+
+private:
+  std::vector<std::string> files_;
+  std::map<std::string, std::string> places_;
+  void readYaml(const std::string &file);
+  void readPlain(const std::string &file);
+};
+
+} // namespace tendril

@@ -1,0 +1,125 @@
+#include "tendril/io/option_files.hpp"
+
+#include "tendril/io/yaml.hpp"
+
+#include <cctype>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+namespace tendril {
+namespace {
+
+bool isYaml(const std::string &file) { return file.ends_with(".yaml") || file.ends_with(".yml"); }
+
+bool isOption(const std::string &word) {
+  return word.size() > 1 && word[0] == '-' && (std::isalpha(static_cast<unsigned char>(word[1])) || word[1] == '-');
+}
+
+using Places = std::map<std::string, int>; // line of each option
+
+/// Maps within maps join their keys by underscores.
+void collect(const YamlValue &value, const std::string &prefix, Places &places) {
+  YamlMap check(value);
+  for (const auto &entry : value.node()) {
+    const YAML::Node key_node = entry.first, node = entry.second;
+    const YamlValue key(key_node, value.file(), "options");
+    const std::string word = key.text();
+    if (word.empty() || !std::isalpha(static_cast<unsigned char>(word[0])))
+      key.fail("'" + word + "' is no name of an option; write names without their dash");
+    const std::string name = prefix + word;
+    if (node.IsMap()) {
+      collect(YamlValue(node, value.file(), name), name + "_", places);
+      continue;
+    }
+    if (name.rfind("options_file", 0) == 0)
+      key.fail("a file of options names no other; give each with its own -options_file");
+    if (node.IsSequence())
+      for (const YAML::Node &item : node)
+        if (!item.IsScalar())
+          key.fail("'" + name + "' is a list of more than values, which no option takes (a scene is given by -scene)");
+    const int line = key_node.Mark().line + 1;
+    const auto [first, fresh] = places.emplace(name, line);
+    if (!fresh)
+      key.fail("the option '" + name + "' stands here a second time (first in line " + std::to_string(first->second) +
+               "); keep one of the two");
+  }
+}
+
+} // namespace
+
+void OptionFiles::readYaml(const std::string &file) {
+  std::vector<YAML::Node> documents;
+  try {
+    documents = YAML::LoadAllFromFile(file);
+  } catch (const YAML::Exception &e) {
+    throw SceneError(file + ":" + std::to_string(e.mark.line + 1) + ": not valid YAML: " + e.msg);
+  }
+  for (const YAML::Node &document : documents) {
+    if (document.IsNull()) continue;
+    Places places;
+    collect(YamlValue(document, file, "options"), "", places);
+    for (const auto &[name, line] : places) places_[name] = file + ":" + std::to_string(line);
+  }
+}
+
+/// PETSc's older format: an option and its value a line.
+void OptionFiles::readPlain(const std::string &file) {
+  std::ifstream in(file);
+  int number = 0;
+  for (std::string line; std::getline(in, line);) {
+    ++number;
+    std::istringstream words(line);
+    std::string word;
+    if (!(words >> word) || std::string("#%!").find(word[0]) != std::string::npos) continue;
+    const std::string place = file + ":" + std::to_string(number);
+    if (!isOption(word))
+      throw SceneError(place + ": '" + word +
+                       "' is no option; options begin with -, and files in YAML are named *.yaml");
+    places_[word.substr(1)] = place;
+  }
+}
+
+void OptionFiles::read(int argc, char **argv) {
+  for (int i = 1; i < argc; ++i) {
+    const std::string option = argv[i];
+    if (!isOption(option)) continue;
+    if (option != "-options_file" && option != "-options_file_yaml") {
+      places_.erase(option.substr(1)); // the last one counts
+      continue;
+    }
+    if (i + 1 == argc || isOption(argv[i + 1])) throw SceneError("option " + option + ": needs a file");
+    const std::string file = argv[++i];
+    if (file.find('$') != std::string::npos) continue; // a variable, which PETSc replaces
+    const std::string named = "option " + option + ": '" + file;
+    if (std::filesystem::is_directory(file)) throw SceneError(named + "' is a folder; give a file");
+    if (!std::ifstream(file))
+      throw SceneError(named + "' cannot be opened; its path begins in the folder where tendril is started");
+    files_.push_back(file);
+    if (option == "-options_file_yaml" || isYaml(file))
+      readYaml(file);
+    else
+      readPlain(file);
+  }
+}
+
+std::string OptionFiles::place(const std::string &option) const {
+  const auto found = places_.find(option);
+  return found == places_.end() ? "" : found->second;
+}
+
+std::string OptionFiles::locate(const std::string &message) const {
+  constexpr const char *start = "option -";
+  if (message.rfind(start, 0) == 0) {
+    const std::string name = message.substr(std::string(start).size());
+    const std::string where = place(name.substr(0, name.find(':')));
+    return where.empty() ? message : where + ": " + message;
+  }
+  const bool of_petsc = message.rfind("setting up the solvers", 0) == 0 || message.rfind("command line", 0) == 0;
+  if (files_.empty() || !of_petsc) return message;
+  std::string text = message + " (options are also read from ";
+  for (const std::string &file : files_) text += (&file == &files_[0] ? "" : ", ") + file;
+  return text + ")";
+}
+
+} // namespace tendril
