@@ -36,33 +36,24 @@ class DepthMap:
         scale = size / max((last - first)[:2].max(), 1e-9)
         width, height = (int(np.ceil(v * scale)) + 4 for v in (last - first)[:2])
         middle = np.append((first + last)[:2] / 2, first[2] - 0.01 * (last - first).max() - 1e-6)
-        self.view = View(middle @ axes, axes, scale, width, height, False)
-        self.texel = 1 / scale
-        depth, _, _, _ = cast(self.view, shapes)
-        self.depth = np.pad(depth.reshape(height, width), 1, constant_values=np.inf)
-        self.empty = not len(shapes.capsules) + len(shapes.triangles)
+        view = View(middle @ axes, axes, scale, width, height, False)
+        self.texel, self.margin = 1 / scale, 10  # empty texels around, so that points there need no clipping
+        self.depth = np.pad(cast(view, shapes)[0].reshape(height, width), self.margin, constant_values=np.inf)
+        self.to_map = axes.T * [scale, -scale, 1]
+        self.shift = [width / 2 + self.margin, height / 2 + self.margin, 0] - view.origin @ self.to_map
 
-    def place(self, points):
-        """Places on the map and depths of points."""
-        local = self.view.local(points)
-        q = self.view.screen(local)
-        return (q[:, 0] + 1).astype(np.float32), (q[:, 1] + 1).astype(np.float32), local[:, 2].astype(np.float32)
-
-    def blockers(self, x, y):
-        """Depth at places of the map; infinite outside."""
-        h, w = self.depth.shape
-        return self.depth[np.clip(y, 0, h - 1).astype(np.int32), np.clip(x, 0, w - 1).astype(np.int32)]
-
-    def open(self, points, radius, taps):
-        """Share of the light (n,) that reaches points, averaged over a disc of `radius` texels."""
-        if self.empty:
-            return np.ones(len(points))
-        x, y, z = self.place(points)
-        z -= np.float32(self.texel)
-        lit = np.zeros(len(x), np.float32)
-        for dx, dy in (radius * disc(taps)).astype(np.float32):
-            lit += self.blockers(x + dx, y + dy) >= z
-        return lit / taps
+    def open(self, points, blur, taps):
+        """Share of the light (n,) that reaches points, averaged over a disc of `blur` texels."""
+        lit = np.ones(len(points), np.float32)
+        x, y, z = (points @ self.to_map + self.shift).astype(np.float32).T
+        (h, w), b = self.depth.shape, blur + 1
+        k = np.flatnonzero((x > b) & (x < w - b) & (y > b) & (y < h - b))
+        x, y, z = x[k], y[k], z[k] - np.float32(self.texel)
+        part, depth = np.zeros(len(k), np.float32), self.depth.ravel()
+        for dx, dy in (blur * disc(taps)).astype(np.float32):
+            part += depth[(y + dy).astype(np.int32) * np.int32(w) + (x + dx).astype(np.int32)] >= z
+        lit[k] = part / np.float32(taps)
+        return lit
 
 
 class Lamp:
@@ -75,11 +66,11 @@ class Lamp:
     def on(self, points, normals):
         """Light (n,) on surfaces; a lamp of one direction gives 1 to those that face it."""
         total = np.zeros(len(points))
+        lifted = points + normals * ((0.6 * self.blur + 1) * max(m.texel for m in self.maps))
         for towards, m in zip(self.towards, self.maps):
             facing = normals @ towards
             k = np.flatnonzero(facing > 0)
-            p = points[k] + normals[k] * ((0.6 * self.blur + 1) * m.texel)
-            total[k] += facing[k] * m.open(p, self.blur, self.taps)
+            total[k] += facing[k] * m.open(lifted[k], self.blur, self.taps)
         return total / len(self.maps)
 
 

@@ -3,7 +3,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .cast import View, cast
+from .cast import View, cast, sample_places
 from .light import box_corners, frame, sky, sun
 from .shapes import dot, unit
 
@@ -153,26 +153,44 @@ def shade(stage, light, points, normal, colour):
     return colour * (0.75 * from_sky + 0.8 * from_sun)[:, None] + 0.18 * shine[:, None]
 
 
-def draw(stage, shapes):
-    """The picture (height, width, 3) as bytes."""
-    from .cast import sample_places
+def runs(shape):
+    """Samples (n, count) of pixels that see the same shape: the pixel and shape of each run, and the run of each."""
+    order = np.argsort(shape, axis=1, kind="stable")
+    ordered = np.take_along_axis(shape, order, 1)
+    first = np.ones(shape.shape, bool)
+    first[:, 1:] = ordered[:, 1:] != ordered[:, :-1]
+    run = np.empty(shape.shape, int)
+    np.put_along_axis(run, order, (np.cumsum(first) - 1).reshape(shape.shape), 1)
+    return np.nonzero(first)[0], ordered[first], run
 
+
+def draw(stage, shapes):
+    """The picture (height, width, 3) as bytes. Samples of a pixel that see the same shape are shaded together."""
     view, light = stage.view, Light(stage, shapes)
     behind, far = background(stage, shapes, light)
     depth, shape, tubes, facets = cast(view, shapes, stage.samples)
     shape = np.where(depth < far[:, None], shape, -1)
     seen = np.flatnonzero((shape >= 0).any(1))
-    count = depth.shape[1]
-    colour = np.repeat(behind[seen][:, None], count, 1)
-    k, s = np.nonzero(shape[seen] >= 0)
-    places = sample_places(stage.samples)[s]
-    py, px = np.divmod(seen[k], view.width)
-    X, Y = view.rays(px + places[:, 0], py + places[:, 1])
-    chosen, z = shape[seen[k], s], depth[seen[k], s].astype(float)
-    for start in range(0, len(k), 1 << 17):
-        j = slice(start, start + (1 << 17))
-        what = surfaces(stage, shapes, tubes, facets, chosen[j], X[j], Y[j], z[j])
-        colour[k[j], s[j]] = shade(stage, light, *what)
-    behind[seen] = np.clip(colour, 0, 1).mean(1)
+    depth, shape = depth[seen], shape[seen]
+    pixel, what, run = runs(shape)
+    share = np.bincount(run.ravel())
+
+    def mean(v):
+        return np.bincount(run.ravel(), np.broadcast_to(v, run.shape).ravel()) / share
+
+    places = sample_places(stage.samples)
+    py, px = np.divmod(seen[pixel], view.width)
+    X, Y = view.rays(px + mean(places[:, 0]), py + mean(places[:, 1]))
+    z = mean(np.where(shape >= 0, depth, 0).astype(float))
+    colour = behind[seen[pixel]]
+    hit = np.flatnonzero(what >= 0)
+    for start in range(0, len(hit), 1 << 17):
+        k = hit[start : start + (1 << 17)]
+        surface = surfaces(stage, shapes, tubes, facets, what[k], X[k], Y[k], z[k])
+        colour[k] = np.clip(shade(stage, light, *surface), 0, 1)
+    weight = (share / shape.shape[1])[:, None] if len(seen) else 0
+    behind[seen] = 0
+    for c in range(3):
+        behind[seen, c] = np.bincount(pixel, (colour * weight)[:, c], len(seen)) if len(seen) else 0
     srgb = np.clip(behind, 0, 1) ** (1 / 2.2)
     return (255 * srgb + 0.5).astype(np.uint8).reshape(view.height, view.width, 3)

@@ -135,23 +135,21 @@ def bar(x, director, half_axes, colour, closed=False):
     p, q = half_axes[0] * d1, half_axes[1] * d2
     ring = x[:, None] + np.stack([p + q, q - p, -p - q, p - q], 1)  # (nv, 4, 3), counterclockwise about the tangent
     outward = np.stack([d2, -d1, -d2, d1], 1)  # of the side that begins at each corner
-    corner, normal, shade = [], [], []
+    parts = []  # corners, normals, colours
 
-    def side(i, j, k, m, nij, nkm, cij, ckm):  # i, j at one ring, k, m at the other
-        for three, n3, c3 in (((i, j, k), (nij, nij, nkm), (cij, cij, ckm)), ((k, j, m), (nkm, nij, nkm), (ckm, cij, ckm))):
-            corner.append(np.stack(three, 1))
-            normal.append(np.stack(n3, 1))
-            shade.append(np.stack(c3, 1))
+    def side(i, j, k, m, near, far):  # i, j at one ring and k, m at the other, with normals and colours of both
+        for three, two in (((i, j, k), (near, near, far)), ((k, j, m), (far, near, far))):
+            parts.append([np.stack(three, 1)] + [np.stack([v[q] for v in two], 1) for q in (0, 1)])
 
     for k in range(4):
         m = (k + 1) % 4
-        side(ring[:n, k], ring[:n, m], ring[following, k], ring[following, m], outward[:n, k], outward[following, k],
-             colour[:n], colour[following])
+        side(ring[:n, k], ring[:n, m], ring[following, k], ring[following, m], (outward[:n, k], colour[:n]),
+             (outward[following, k], colour[following]))
     if not closed:
         for end, sign in ((0, -1), (-1, 1)):
-            r, nn, c = ring[[end]], sign * tangent[[end]], colour[[end]]
-            side(r[:, 0], r[:, 1], r[:, 3], r[:, 2], nn, nn, c, c)
-    corner, normal, shade = (np.concatenate(v) for v in (corner, normal, shade))
+            r, both = ring[[end]], (sign * tangent[[end]], colour[[end]])
+            side(r[:, 0], r[:, 1], r[:, 3], r[:, 2], both, both)
+    corner, normal, shade = (np.concatenate(v) for v in zip(*parts))
     keep = np.isfinite(corner).all((1, 2))
     return Shapes(triangles=Triangles(corner[keep], normal[keep], shade[keep]))
 

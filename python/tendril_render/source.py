@@ -8,7 +8,7 @@ try:
 except ImportError:
     from .stand_in import Trajectory
 
-OF_OUR_OWN = {"time": "s", "rod": ""}  # values that every trajectory has
+OF_OUR_OWN = ("time", "rod")  # values that every trajectory has
 
 
 class Mistake(Exception):
@@ -20,7 +20,8 @@ def open_trajectory(path):
     try:
         t = Trajectory(path)
     except Exception as e:  # h5py tells of broken files by errors of many kinds
-        raise Mistake(f"{path}: not a trajectory that can be read ({str(e).splitlines()[0] if str(e) else type(e).__name__})")
+        reason = (str(e).splitlines() or [type(e).__name__])[0]
+        raise Mistake(f"{path}: not a trajectory that can be read ({reason})")
     if not len(t.time) or not len(t.rods):
         raise Mistake(f"{path}: no frame yet")
     return t
@@ -37,14 +38,15 @@ def frame_at(t, time):
 
 def fields(t):
     """Names of what may give colours."""
-    return list(OF_OUR_OWN) + [n for n in t.field_names if str(t.field(n).place)[:4] in ("vert", "edge")]
+    return list(OF_OUR_OWN) + [n for n in t.field_names
+                              if n != "director" and str(t.field(n).place)[:4] in ("vert", "edge")]
 
 
 def value(t, name, index, frame):
     """Values (nv,) of a field at the vertices of a rod; of vectors the length, of edges the mean of both sides."""
     rod = t.rods[index]
     if name in OF_OUR_OWN:
-        return np.full(len(rod.position(frame)), t.time[frame] if name == "time" else index)
+        return np.full(len(rod.position(frame)), t.time[frame] if name == "time" else index, float)
     v = np.asarray(rod.field(name, frame), float)
     if v.ndim > 1:
         v = np.sqrt((v * v).sum(-1))
@@ -53,34 +55,50 @@ def value(t, name, index, frame):
     return v
 
 
+def is_static(t):
+    """Whether nothing moves: the times of frames are then places on a path of loads, without a unit."""
+    if "velocity" not in t.field_names or len(t.time) < 2:
+        return False
+    return not any(np.any(r.field("velocity", len(t.time) - 1)) for r in t.rods)
+
+
 class Source:
     """Shapes of frames of a trajectory, coloured by a field."""
 
-    def __init__(self, t, field, frames, theme, colours, radius=None, smooth=False):
+    def __init__(self, t, field, frames, theme, colours, radius=None, smooth=False, offset=(0, 0, 0),
+                 rods=slice(None)):
         if field is not None and field not in fields(t):
             raise Mistake(f"field {field}: this trajectory has {', '.join(fields(t))}")
         self.t, self.field, self.theme, self.radius, self.smooth = t, field, theme, radius, smooth
+        self.rods = range(len(t.rods))[rods]
+        if not self.rods:
+            raise Mistake(f"none of the {len(t.rods)} rods is chosen")
+        self.offset = np.asarray(offset, float)  # from one frame of a picture to the next [m]
         self.left_out = 0  # edges that are not finite
+        self.clipped = False  # whether there are values above the scale
         self.colours, self.range = None, None
         if field is not None:
             self.range = self.values_range(frames)
             self.colours = colours(*self.range)
 
     def values_range(self, frames):
-        """Ends of the scale: all values but half a per cent at each end; symmetric for those of both signs."""
+        """Ends of the scale: all values but two per cent at each end; symmetric for those of both signs."""
         if self.field == "time":
             v = self.t.time[list(frames)]
         else:
-            v = np.concatenate([value(self.t, self.field, k, f) for f in frames for k in range(len(self.t.rods))])
+            v = np.concatenate([value(self.t, self.field, k, f) for f in frames for k in self.rods])
         v = v[np.isfinite(v)]
         if not len(v):
             raise Mistake(f"field {self.field}: no finite value in these frames")
         if self.field in OF_OUR_OWN:
             return v.min(), v.max()
-        lower, upper = np.percentile(v, [0.5, 99.5])
-        if lower < -0.02 * upper and upper > -0.02 * lower:
-            return -max(upper, -lower), max(upper, -lower)
-        return (min(lower, 0), upper) if lower < 0.3 * upper else (lower, upper)
+        lower, upper = np.percentile(v, [2, 98])
+        if lower < -0.1 * upper and upper > -0.1 * lower:
+            lower, upper = -max(upper, -lower), max(upper, -lower)
+        elif 0 <= lower < 0.3 * upper:
+            lower = 0
+        self.clipped = v.max() > upper + 0.02 * (upper - lower)
+        return lower, upper
 
     def half_axes(self, rod):
         """Half axes (2,) [m]; 0 for a line of fixed width."""
@@ -91,49 +109,62 @@ class Source:
         axes = np.asarray(rod.half_axes, float)
         return axes if np.isfinite(axes).all() else np.full(2, np.nan_to_num(rod.radius))
 
-    def rod(self, index, frame, group, pixel):
-        """Shapes of one rod; a strip thinner than a pixel is drawn as an ellipse."""
+    def clouds(self, frames):
+        """Points (n, 3) along all rods [m], an array for each frame of a picture."""
+        def along(x, closed):
+            x = np.concatenate([x, x[:1]]) if closed else x
+            s = np.arange(8)[:, None, None] / 8
+            return np.concatenate([(x[:-1] + s * (x[1:] - x[:-1])).reshape(-1, 3), x[-1:]])
+
+        rods = [self.t.rods[k] for k in self.rods]
+        return [np.concatenate([along(r.position(f), r.closed) for r in rods]) + j * self.offset
+                for j, f in enumerate(frames)]
+
+    def rod(self, index, frame, place, pixel):
+        """Shapes of one rod in the frame at a place of the list; strips thinner than a pixel become ellipses."""
         rod = self.t.rods[index]
-        x, d, axes = rod.position(frame), rod.director(frame), self.half_axes(rod)
+        x, d, axes = rod.position(frame) + place * self.offset, rod.director(frame), self.half_axes(rod)
         if self.colours is None:
             colour = np.tile(np.asarray(self.theme.plain) ** 2.2, (len(x), 1))
         else:
             colour = self.colours.of(np.nan_to_num(value(self.t, self.field, index, frame)))
         bad = ~np.isfinite(x).all(1)
-        self.left_out += int((bad | (np.roll(bad, -1)))[: len(d)].sum())
+        self.left_out += int((bad | np.roll(bad, -1))[: len(d)].sum())
         if self.smooth:
             x, d, colour = smoothed(x, d, colour, rod.closed)
         if rod.section == "rectangle" and self.radius is None and axes.max() > pixel:
             return bar(x, d, axes, colour, rod.closed)
-        return tube(x, d, axes, colour, rod.closed, group)
+        return tube(x, d, axes, colour, rod.closed, place * len(self.t.rods) + index)
 
     def shapes(self, frames, pixel=0):
         """All that is seen in some frames at once; `pixel`: the size of one [m]."""
-        n = len(self.t.rods)
-        parts = [self.rod(k, f, j * n + k, pixel) for j, f in enumerate(frames) for k in range(n)]
+        parts = [self.rod(k, f, j, pixel) for j, f in enumerate(frames) for k in self.rods]
         for j, f in enumerate(frames):
-            for things, colour in ((self.t.bodies, self.theme.body), (self.t.colliders, self.theme.collider)):
-                for thing in things:
-                    part = body(thing.shape, thing.parameters, *thing.pose(f), np.asarray(colour) ** 2.2,
-                                thing.vertices, thing.triangles)
-                    parts.append(part)
+            parts += [self.thing(b, f, self.theme.body, j) for b in self.t.bodies]
+            parts += [self.thing(c, f, self.theme.collider, j) for c in self.t.colliders]
         return join(parts)
+
+    def thing(self, thing, frame, colour, place=0):
+        """Shapes of a body or collider."""
+        position, quaternion = thing.pose(frame)
+        return body(thing.shape, thing.parameters, position + place * self.offset, quaternion, np.asarray(colour) ** 2.2,
+                    thing.vertices, thing.triangles)
 
     def bounds(self, frames):
         """Lower and upper corner [m] of all rods and bodies in some frames."""
         lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
         for f in frames:
-            for rod in self.t.rods:
+            for rod in (self.t.rods[k] for k in self.rods):
                 x = rod.position(f)
                 x = x[np.isfinite(x).all(1)]
                 if len(x):
                     r = self.half_axes(rod).max()
                     lower, upper = np.minimum(lower, x.min(0) - r), np.maximum(upper, x.max(0) + r)
             for thing in list(self.t.bodies) + list(self.t.colliders):
-                part = body(thing.shape, thing.parameters, *thing.pose(f), (0, 0, 0), thing.vertices, thing.triangles)
-                p, r = part.points()
+                p, r = self.thing(thing, f, (0, 0, 0)).points()
                 if len(p):
-                    lower, upper = np.minimum(lower, (p - r[:, None]).min(0)), np.maximum(upper, (p + r[:, None]).max(0))
+                    lower = np.minimum(lower, (p - r[:, None]).min(0))
+                    upper = np.maximum(upper, (p + r[:, None]).max(0))
         if not np.isfinite(lower).all():
             raise Mistake("no finite position in these frames")
         return lower, upper
