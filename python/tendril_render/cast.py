@@ -71,7 +71,7 @@ class Tubes:
         self.a, self.b, self.flat, self.group = view.local(c.a), view.local(c.b), c.flat, c.group
         edge = self.b - self.a
         length = np.sqrt(dot(edge, edge))
-        t = np.where(length[:, None] > 0, unit(edge), [0.0, 0, 1])
+        t = np.where(length[:, None] > 0, unit(edge), [1.0, 0, 0])
         d1 = perpendicular(t, view.turned(c.director))
         d2 = np.cross(t, d1)
         # Hair is drawn a pixel wide, and instead lets through what is behind it.
@@ -83,7 +83,7 @@ class Tubes:
         axes = np.where(largest[:, None] > 0, c.half_axes * grow[:, None], wanted[:, None])
         axes = np.maximum(axes, 0.25 * pixel[:, None])
         self.radius = axes.max(1, initial=0)
-        cap = np.sqrt(axes[:, 0] * axes[:, 1])
+        cap = axes.min(1, initial=np.inf)
         self.m = np.stack([d1 / axes[:, :1], d2 / axes[:, 1:], t / cap[:, None]], 1)
         self.top = length / cap
         self.shift = np.einsum("nij,nj->ni", self.m, self.a)
@@ -134,10 +134,11 @@ class Tubes:
         (qx, qy, qz), (ex, ey, ez) = self.unit_ray(view, i, X, Y)
         a, b, c = ex * ex + ey * ey, qx * ex + qy * ey, qx * qx + qy * qy - 1
         d = b * b - a * c
-        k = np.flatnonzero(d >= 0)  # the others miss the endless cylinder, and with it the ends
-        i, a, b, c, d, qz, ez = i[k], a[k], b[k], c[k], d[k], qz[k], ez[k]
-        t = -(b + np.sqrt(d)) / np.maximum(a, 1e-30)
-        z, top = qz + t * ez, self.top[i]
+        along = a < 1e-12  # rays along the axis come in by an end
+        k = np.flatnonzero(np.where(along, c <= 0, d >= 0))  # others miss the endless cylinder, and with it the ends
+        i, a, b, c, d, qz, ez, along = i[k], a[k], b[k], c[k], d[k], qz[k], ez[k], along[k]
+        t = -(b + np.sqrt(np.maximum(d, 0))) / np.where(along, 1, a)
+        z, top = np.where(along, np.where(ez > 0, -np.inf, np.inf), qz + t * ez), self.top[i]
         end = np.flatnonzero((z < 0) | (z > top))
         last = z[end] > top[end]
         e, i2, a, b, c = ez[end], i[end], a[end], b[end], c[end]

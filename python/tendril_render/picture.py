@@ -150,7 +150,7 @@ def shade(stage, light, points, normal, colour):
     to_eye = unit(stage.view.origin - points)
     half = unit(to_eye + light.towards)
     shine = np.clip(dot(normal, half), 0, 1) ** 50 * np.minimum(from_sun, 1)
-    return colour * (0.75 * from_sky + 0.8 * from_sun)[:, None] + 0.18 * shine[:, None]
+    return colour * (0.68 * from_sky + 0.74 * from_sun)[:, None] + 0.18 * shine[:, None]
 
 
 def runs(shape):

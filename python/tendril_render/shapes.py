@@ -106,7 +106,9 @@ def smoothed(x, director, colour, closed, pieces=4):
 
 
 def tube(x, director, half_axes, colour, closed=False, group=0):
-    """A rod of elliptic section: a capsule per edge, cut off at free ends. Edges that are not finite are left out.
+    """A rod of round section, or of one too thin for more: a capsule per edge, cut off at free ends.
+
+    Edges that are not finite are left out.
 
     x (nv, 3) [m], director (ne, 3), half_axes (2,) [m], colour (nv, 3); ne = nv if closed, else nv - 1.
     """
@@ -121,9 +123,25 @@ def tube(x, director, half_axes, colour, closed=False, group=0):
     return Shapes(capsules=Capsules(*(v[keep] for v in vars(c).values())))
 
 
-def bar(x, director, half_axes, colour, closed=False):
-    """A rod of rectangular section: mitred rings of four corners, joined by triangles; as `tube`."""
-    n, nv = len(director), len(x)
+RECTANGLE = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]), np.array([[0, 1], [-1, 0], [0, -1], [1, 0]])
+
+
+def ellipse(sides=24):
+    """Corners (n, 2) of a unit circle, as an outline for `bar`; its normals are those at the corners."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    return np.stack([np.cos(angle), np.sin(angle)], 1), None
+
+
+def bar(x, director, half_axes, colour, closed=False, outline=RECTANGLE):
+    """A rod of any convex section: rings of corners at the vertices, in the planes that halve the angles of the edges,
+    joined by triangles; arguments as for `tube`.
+
+    outline: corners (n, 2) in units of the half axes, counterclockwise about the tangent, and the normals (n, 2) of the
+    sides that begin at them; None for a smooth one.
+    """
+    corners, normals = outline
+    a, b = half_axes
+    n, nv, count = len(director), len(x), len(corners)
     following = (np.arange(n) + 1) % nv
     t = unit(x[following] - x[:n])
     before, after = np.arange(nv) - 1, np.arange(nv)  # the edges that meet at a vertex
@@ -131,24 +149,29 @@ def bar(x, director, half_axes, colour, closed=False):
         before, after = np.clip(before, 0, n - 1), np.clip(after, 0, n - 1)
     tangent = unit(t[before] + t[after])
     d1 = perpendicular(tangent, unit(director[before] + director[after]))
-    d2 = np.cross(tangent, d1)
-    p, q = half_axes[0] * d1, half_axes[1] * d2
-    ring = x[:, None] + np.stack([p + q, q - p, -p - q, p - q], 1)  # (nv, 4, 3), counterclockwise about the tangent
-    outward = np.stack([d2, -d1, -d2, d1], 1)  # of the side that begins at each corner
-    parts = []  # corners, normals, colours
+    frame = np.stack([d1, np.cross(tangent, d1)], 1)
+    ring = x[:, None] + np.einsum("ck,vki->vci", corners * [a, b], frame)  # (nv, corners, 3)
+    if normals is None:
+        first = np.einsum("ck,vki->vci", unit(np.pad(corners * [b, a], ((0, 0), (0, 1))))[:, :2], frame)
+        last = np.roll(first, -1, 1)
+    else:
+        first = last = np.einsum("ck,vki->vci", normals, frame)
+    parts = []  # corners, normals, colours of triangles
 
-    def side(i, j, k, m, near, far):  # i, j at one ring and k, m at the other, with normals and colours of both
-        for three, two in (((i, j, k), (near, near, far)), ((k, j, m), (far, near, far))):
-            parts.append([np.stack(three, 1)] + [np.stack([v[q] for v in two], 1) for q in (0, 1)])
+    def quad(places, outward, shade):  # two corners at one ring, the same two at the other
+        for k in ((0, 1, 2), (2, 1, 3)):
+            parts.append([np.stack([v[j] for j in k], 1) for v in (places, outward, shade)])
 
-    for k in range(4):
-        m = (k + 1) % 4
-        side(ring[:n, k], ring[:n, m], ring[following, k], ring[following, m], (outward[:n, k], colour[:n]),
-             (outward[following, k], colour[following]))
+    here, there = colour[:n], colour[following]
+    for k in range(count):
+        m = (k + 1) % count
+        quad((ring[:n, k], ring[:n, m], ring[following, k], ring[following, m]),
+             (first[:n, k], last[:n, k], first[following, k], last[following, k]), (here, here, there, there))
     if not closed:
         for end, sign in ((0, -1), (-1, 1)):
-            r, both = ring[[end]], (sign * tangent[[end]], colour[[end]])
-            side(r[:, 0], r[:, 1], r[:, 3], r[:, 2], both, both)
+            for k in range(1, count - 1):
+                fan = np.stack([ring[[end], 0], ring[[end], k], ring[[end], k + 1]], 1)
+                parts.append([fan, *(np.repeat(v[[end]][:, None], 3, 1) for v in (sign * tangent, colour))])
     corner, normal, shade = (np.concatenate(v) for v in zip(*parts))
     keep = np.isfinite(corner).all((1, 2))
     return Shapes(triangles=Triangles(corner[keep], normal[keep], shade[keep]))

@@ -1,7 +1,7 @@
 """From a trajectory to shapes: which frames, which values, which colours."""
 import numpy as np
 
-from .shapes import bar, body, join, smoothed, tube
+from .shapes import RECTANGLE, bar, body, ellipse, join, smoothed, tube
 
 try:
     from tendril import Trajectory
@@ -121,7 +121,7 @@ class Source:
                 for j, f in enumerate(frames)]
 
     def rod(self, index, frame, place, pixel):
-        """Shapes of one rod in the frame at a place of the list; strips thinner than a pixel become ellipses."""
+        """Shapes of one rod in the frame at a place of the list; what is wide in pixels is swept."""
         rod = self.t.rods[index]
         x, d, axes = rod.position(frame) + place * self.offset, rod.director(frame), self.half_axes(rod)
         if self.colours is None:
@@ -132,8 +132,10 @@ class Source:
         self.left_out += int((bad | np.roll(bad, -1))[: len(d)].sum())
         if self.smooth:
             x, d, colour = smoothed(x, d, colour, rod.closed)
-        if rod.section == "rectangle" and self.radius is None and axes.max() > pixel:
-            return bar(x, d, axes, colour, rod.closed)
+        wide = axes.max() > max(pixel, 1.02 * axes.min()) and len(d)
+        if wide or (rod.section == "rectangle" and axes.max() > pixel and self.radius is None):
+            outline = RECTANGLE if rod.section == "rectangle" else ellipse()
+            return bar(x, d, axes, colour, rod.closed, outline)
         return tube(x, d, axes, colour, rod.closed, place * len(self.t.rods) + index)
 
     def shapes(self, frames, pixel=0):
@@ -147,8 +149,8 @@ class Source:
     def thing(self, thing, frame, colour, place=0):
         """Shapes of a body or collider."""
         position, quaternion = thing.pose(frame)
-        return body(thing.shape, thing.parameters, position + place * self.offset, quaternion, np.asarray(colour) ** 2.2,
-                    thing.vertices, thing.triangles)
+        return body(thing.shape, thing.parameters, position + place * self.offset, quaternion,
+                    np.asarray(colour) ** 2.2, thing.vertices, thing.triangles)
 
     def bounds(self, frames):
         """Lower and upper corner [m] of all rods and bodies in some frames."""

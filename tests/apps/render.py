@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from types import SimpleNamespace
 
 program, root = os.path.abspath(sys.argv[1]), os.path.abspath(sys.argv[2])
 sys.path.insert(0, root + "/python")
@@ -15,8 +16,9 @@ import h5py
 import numpy as np
 from PIL import Image
 
-from tendril_render import picture, shapes
+from tendril_render import picture, shapes, source
 from tendril_render.cast import View, cast
+from tendril_render.legend import Colours
 
 script = root + "/scripts/render"
 environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
@@ -33,7 +35,11 @@ def area(shape, samples=3, view=None):
     """Covered area [m^2]."""
     view = view or looking()
     _, seen, _, _ = cast(view, shape, samples)
-    return (seen >= 0).mean(1).sum() / (view.scale / 10) ** 2
+    return (seen >= 0).mean(1).sum() / (view.scale / 10 if view.perspective else view.scale) ** 2
+
+
+def swept(*arguments):
+    return shapes.bar(*arguments, outline=shapes.ellipse())
 
 
 def rod(half_axes, director=(0, 0, 1), direction=(1, 0, 0), edges=7, section=shapes.tube):
@@ -59,7 +65,7 @@ def straight_rods_cover_their_area():
 
 def sections_follow_directors():
     a, b = 0.06, 0.02
-    for section in (shapes.tube, shapes.bar):
+    for section in (shapes.tube, shapes.bar, swept):
         expect(area(rod((a, b), director=(0, 1, 0), section=section)), 2 * a, 0.01, "the wide side")
         expect(area(rod((a, b), director=(0, 0, 1), section=section)), 2 * b, 0.015, "the narrow side")
 
@@ -71,6 +77,9 @@ def bodies_cover_their_area():
     expect(area(shapes.body("capsule", [0.1, 0.2], at, quarter, colour)), 0.08 + np.pi * 0.01, 0.01, "capsule")
     expect(area(shapes.body("box", [0.3, 0.2, 1e-6], at, turn, colour)), 0.24, 0.01, "box")
     expect(area(shapes.body("box", [0.3, 1e-3, 0.1], (0, 0, 0), quarter, colour)), 0.12, 0.01, "box, turned")
+    end_on = shapes.body("capsule", [0.1, 0.2], (0, 0, 0), turn, colour)
+    straight_down = View(np.array([0, 0, 9.0]), looking().axes, 200, 400, 300, False)
+    expect(area(end_on, view=straight_down), np.pi * 0.01, 0.01, "capsule from its end, by parallel rays")
     tetrahedron = [[0, 0, 0], [0.4, 0, 0], [0, 0.4, 0], [0, 0, 1e-3]]
     faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
     mesh = shapes.body("mesh", [], at, turn, colour, tetrahedron, faces)
@@ -105,7 +114,7 @@ def ring_has_no_gap():
     n = 24
     angle = 2 * np.pi * np.arange(n) / n
     x = 0.5 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1)
-    for section, axes in ((shapes.tube, (0.03, 0.03)), (shapes.tube, (0.01, 0.05)), (shapes.bar, (0.02, 0.04))):
+    for section, axes in ((shapes.tube, (0.03, 0.03)), (swept, (0.01, 0.05)), (shapes.bar, (0.02, 0.04))):
         ring = section(x, np.tile([0, 0, 1.0], (n, 1)), axes, np.zeros((n, 3)), True)
         _, seen, _, _ = cast(looking(), ring, 1)
         free = seen.reshape(300, 400) < 0
@@ -143,6 +152,40 @@ def rod_on_the_floor_touches_its_shadow():
     assert row[:2].max() < 0.75 * open_floor, f"light between rod and shadow: {row[:8]}, floor {open_floor}"
     row, open_floor = shadow_row(0.25)
     assert row[:2].min() > 0.9 * open_floor and row.min() < 0.93 * open_floor, f"no shadow apart: {row}, {open_floor}"
+
+
+def trajectories_become_shapes():
+    """Rods of every section, a body that falls and colliders, in two frames side by side."""
+    def fake_rod(section, half_axes, closed=False):
+        x = np.stack([np.linspace(0, 1, 5), np.zeros(5), np.zeros(5)], 1)
+        return SimpleNamespace(
+            name=section, closed=closed, section=section, half_axes=np.array(half_axes, float), radius=0.01,
+            position=lambda frame: x, director=lambda frame: np.tile([0, 1.0, 0], (5 if closed else 4, 1)),
+            field=lambda name, frame: np.arange(5.0 if closed else 4.0) if name == "force" else x * frame)
+
+    def thing(shape, parameters, y=0.0, vertices=None, triangles=None):
+        return SimpleNamespace(shape=shape, parameters=parameters, vertices=vertices, triangles=triangles,
+                               pose=lambda frame: (np.array([0, y - frame, 0]), np.array([1.0, 0, 0, 0])))
+
+    nan = np.nan
+    t = SimpleNamespace(
+        time=np.array([0.0, 0.5]), field_names=["position", "force"], supports=[], unit=lambda name: "N",
+        field=lambda name: SimpleNamespace(place="edges" if name == "force" else "vertices"),
+        rods=[fake_rod("circle", (0.1, 0.1)), fake_rod("rectangle", (0.1, 0.2)), fake_rod("ellipse", (0.1, 0.2)),
+              fake_rod("none", (nan, nan)), fake_rod("circle", (nan, nan), closed=True)],
+        bodies=[thing("sphere", [0.2], 3.0)],
+        colliders=[thing("plane", [0, 1, 0]), thing("box", [1, 1, 1]), thing("capsule", [0.1, 0.5]),
+                   thing("mesh", [], 0.0, np.eye(3), np.array([[0, 1, 2]]))])
+    s = source.Source(t, "force", [0, 1], picture.LIGHT, lambda a, b: Colours(a, b, False), offset=(10, 0, 0))
+    one, both = s.shapes([0], 0.001), s.shapes([0, 1], 0.001)
+    bars = 4 * (8 + 48) + 4 + 44  # of rectangle and ellipse, with their ends
+    assert len(one.capsules) == 4 + 4 + 5 + 1 + 1 and len(one.triangles) == bars + 12 + 1 and len(one.planes) == 1
+    assert len(both.capsules) == 2 * len(one.capsules) and both.points()[0][:, 0].max() > 10
+    assert (s.half_axes(t.rods[3]) == 0).all() and (s.half_axes(t.rods[4]) == 0.01).all()
+    assert np.allclose(source.value(t, "force", 0, 0), [0, 0.5, 1.5, 2.5, 3])
+    assert np.allclose(source.value(t, "position", 0, 1), np.linspace(0, 1, 5))
+    lower, upper = s.bounds([0, 1])
+    assert upper[1] == 3.2 and lower[1] == -2
 
 
 # The script.
@@ -285,6 +328,7 @@ nearer_hides_farther()
 curves_are_smooth()
 ring_has_no_gap()
 rod_on_the_floor_touches_its_shadow()
+trajectories_become_shapes()
 with tempfile.TemporaryDirectory() as tmp:
     helix = tmp + "/helix"
     subprocess.run([program, "-scene", root + "/data/scenes/helix.yaml", "-output_dir", helix], check=True,
