@@ -55,6 +55,14 @@ def value(t, name, index, frame):
     return v
 
 
+def title(t, name):
+    """What the scale of a field is called."""
+    if name in (None, *OF_OUR_OWN):
+        return name or ""
+    words = name.replace("_", " ")
+    return f"|{words}|" if np.ndim(t.rods[0].field(name, 0)) > 1 else words
+
+
 def is_static(t):
     """Whether nothing moves: the times of frames are then places on a path of loads, without a unit."""
     if "velocity" not in t.field_names or len(t.time) < 2:
