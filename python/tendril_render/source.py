@@ -160,21 +160,29 @@ class Source:
         return body(thing.shape, thing.parameters, position + place * self.offset, quaternion,
                     np.asarray(colour) ** 2.2, thing.vertices, thing.triangles)
 
-    def bounds(self, frames):
-        """Lower and upper corner [m] of all rods and bodies in some frames."""
+    def points(self, frame, place=0):
+        """Centres (n, 3) and radii (n,) [m] of balls that hold the rods and bodies; colliders may be endless."""
+        parts = [self.thing(b, frame, (0, 0, 0), place).points() for b in self.t.bodies]
+        for rod in (self.t.rods[k] for k in self.rods):
+            x = rod.position(frame) + place * self.offset
+            x = x[np.isfinite(x).all(1)]
+            parts.append((x, np.full(len(x), self.half_axes(rod).max())))
+        return tuple(np.concatenate(v) for v in zip(*parts))
+
+    def bounds(self, frames, places=None):
+        """Lower and upper corner [m] of all rods and bodies in some frames, and of colliders close to them."""
         lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
-        for f in frames:
-            for rod in (self.t.rods[k] for k in self.rods):
-                x = rod.position(f)
-                x = x[np.isfinite(x).all(1)]
-                if len(x):
-                    r = self.half_axes(rod).max()
-                    lower, upper = np.minimum(lower, x.min(0) - r), np.maximum(upper, x.max(0) + r)
-            for thing in list(self.t.bodies) + list(self.t.colliders):
-                p, r = self.thing(thing, f, (0, 0, 0)).points()
-                if len(p):
-                    lower = np.minimum(lower, (p - r[:, None]).min(0))
-                    upper = np.maximum(upper, (p + r[:, None]).max(0))
+        for f, place in zip(frames, places or [0] * len(frames)):
+            x, r = self.points(f, place)
+            lower = np.minimum(lower, (x - r[:, None]).min(0, initial=np.inf))
+            upper = np.maximum(upper, (x + r[:, None]).max(0, initial=-np.inf))
         if not np.isfinite(lower).all():
             raise Mistake("no finite position in these frames")
+        reach = np.linalg.norm(upper - lower) / 2
+        for c in self.t.colliders:
+            x, r = self.thing(c, frames[-1], (0, 0, 0)).points()
+            if len(x):
+                first, last = (x - r[:, None]).min(0), (x + r[:, None]).max(0)
+                lower, upper = (np.minimum(lower, np.maximum(first, lower - reach)),
+                                np.maximum(upper, np.minimum(last, upper + reach)))
         return lower, upper

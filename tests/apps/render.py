@@ -185,7 +185,10 @@ def trajectories_become_shapes():
     assert np.allclose(source.value(t, "force", 0, 0), [0, 0.5, 1.5, 2.5, 3])
     assert np.allclose(source.value(t, "position", 0, 1), np.linspace(0, 1, 5))
     lower, upper = s.bounds([0, 1])
-    assert upper[1] == 3.2 and lower[1] == -2
+    assert upper[1] == 3.2 and lower[1] == -2, "the body, and the box below"
+    t.colliders.append(thing("box", [1000, 1, 1000]))
+    lower, upper = s.bounds([0, 1])
+    assert upper[0] < 10 and lower[2] > -10, "a collider as wide as the world leaves the rods in sight"
 
 
 # The script.
