@@ -28,12 +28,29 @@ def open_trajectory(path):
 
 
 def frame_at(t, time):
-    """The number of the frame nearest to a time [s] of the run."""
-    first, last = t.time[0], t.time[-1]
-    slack = 0.51 * np.diff(t.time).max(initial=0) + 1e-9 * abs(last)
+    """The number of the frame nearest to a time [s] of the run, the first of several."""
+    first, last = t.time.min(), t.time.max()
+    slack = 0.51 * np.abs(np.diff(t.time)).max(initial=0) + 1e-9 * abs(last)
     if not first - slack <= time <= last + slack:
         raise Mistake(f"time {time:g} s is outside the run, {first:g} to {last:g} s")
     return int(np.abs(t.time - time).argmin())
+
+
+def frame_number(t, k):
+    """The number of a frame, negative ones counted from the end."""
+    n = len(t.time)
+    if not -n <= k < n:
+        raise Mistake(f"frame {k}: the run has {n}, numbered from 0")
+    return k % n
+
+
+def moving_frames(t, fps, seconds=None):
+    """Frames of a moving picture, evenly spaced in time; in statics all frames."""
+    if is_static(t):
+        return list(range(len(t.time)))
+    span = t.time[-1] - t.time[0]
+    n = max(1, round(fps * (seconds or span)))
+    return [frame_at(t, v) for v in t.time[0] + span * np.arange(n) / n]
 
 
 def fields(t):
@@ -58,13 +75,13 @@ def value(t, name, index, frame):
 def title(t, name):
     """What the scale of a field is called."""
     if name in (None, *OF_OUR_OWN):
-        return name or ""
+        return "load factor" if name == "time" and is_static(t) else name or ""
     words = name.replace("_", " ")
     return f"|{words}|" if np.ndim(t.rods[0].field(name, 0)) > 1 else words
 
 
 def is_static(t):
-    """Whether nothing moves: the times of frames are then places on a path of loads, without a unit."""
+    """Whether nothing moves: the times of frames are then load factors, which may fall as well as rise."""
     if "velocity" not in t.field_names or len(t.time) < 2:
         return False
     return not any(np.any(r.field("velocity", len(t.time) - 1)) for r in t.rods)

@@ -298,6 +298,7 @@ def wrong_input(tmp, helix):
     for arguments, words in ((["--field", "nonsense"], "time, rod, axial_force, position"),
                              (["--times", "5"], "time 5 s is outside the run, 0 to 2 s"),
                              (["--times", "soon"], "soon"), (["--times", "nan"], "nan"),
+                             (["--frames", "121"], "the run has 121"), (["--frames", "x"], "--frames"),
                              (["--elevation", "95"], "-90 to 90"),
                              (["--size", "big"], "1280x720"), (["--size", "0x10"], "1280x720"),
                              (["--rods", "3:"], "none of the 1 rods"), (["--rods", "x"], "first:end"),
