@@ -97,8 +97,7 @@ std::string rulesOf(std::string_view block) {
    {"oneOf": [{"required": ["radius"]}, {"required": ["radii"]}, {"anyOf": [{"required": ["width"]}, {"required": ["height"]}]}]},
    {"oneOf": [{"required": ["poisson"]}, {"required": ["shear"]}]}],
   "dependencies": {"width": ["height"], "height": ["width"]}},
- {"required": ["linear_density", "axial_stiffness"],
-  "not": {"anyOf": [{"required": ["radius"]}, {"required": ["radii"]}, {"required": ["width"]}, {"required": ["height"]}, {"required": ["young"]},
+ {"not": {"anyOf": [{"required": ["radius"]}, {"required": ["radii"]}, {"required": ["width"]}, {"required": ["height"]}, {"required": ["young"]},
    {"required": ["poisson"]}, {"required": ["shear"]}, {"required": ["density"]}]}}])";
   if (block == "supports[]")
     return R"("if": {"properties": {"type": {"const": "pin"}}},
@@ -185,7 +184,7 @@ std::string helpText() {
     for (const Key &key : keys)
       if (key.isOption() && std::string_view(key.group) == group) addOption(out, std::string(key.name()), key);
   }
-  out << "PETSc's -snes_*, -ksp_*, -pc_*, -mat_*, -log_view and -options_file FILE work, too: tendril -scene FILE -help lists them.\n";
+  out << "PETSc's -snes_*, -ksp_*, -pc_*, -mat_*, -log_view, -options_file work, too; tendril -scene FILE -help lists them.\n";
   return out.str();
 }
 

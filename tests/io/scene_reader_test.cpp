@@ -52,6 +52,15 @@ TEST(SceneReader, SimulationBlock) {
   EXPECT_EQ(run.load_steps, 7);
 }
 
+TEST(SceneReader, PlacesShapes) {
+  // Scaled, then turned by a quarter about z, then moved.
+  const Rod rod = readRod("points: [[0, 0, 0], [1, 0, 0], [1, 2, 0]], place: {scale: 0.5, rotation: [0, 0, 1.5707963267948966], translation: [0, 0, 3]}");
+  EXPECT_LT((rod.position[1] - Vec3(0, 0.5, 3)).norm(), 1e-15);
+  EXPECT_LT((rod.position[2] - Vec3(-1, 0.5, 3)).norm(), 1e-15);
+  const Rod helix = readRod("helix: {length: 1, radius: 0.1, turns: 2, edges: 32}, place: {translation: [0, 1, 0]}");
+  EXPECT_EQ(helix.position[0], readRod("helix: {length: 1, radius: 0.1, turns: 2, edges: 32}").position[0] + Vec3(0, 1, 0));
+}
+
 TEST(SceneReader, SectionsOfEveryShape) {
   const std::string elastic = "young: 1e6, poisson: 0.25, density: 1000";
   const Material circle = readRod(line + ", material: {radius: 0.01, " + elastic + "}").material;
