@@ -157,6 +157,9 @@ with tempfile.TemporaryDirectory() as tmp:
         for k, grid in enumerate(grids):
             items = {"position": grid.find("Geometry/DataItem")}
             items.update((a.get("Name"), a.find("DataItem")) for a in grid.findall("Attribute"))
+            name, path = items.pop("radius").text.split(":")
+            with h5py.File(short + "/" + name, "r", swmr=True) as h5:
+                assert h5[path].shape == f["position"].shape[1:2] and np.all(h5[path][:] == 0.005)  # of the section
             assert items.keys() == (f.keys() if block.get("Name") == "edges" else f.keys() - of_edges), items.keys()
             assert {a.get("Name") for a in grid.findall("Attribute") if a.get("Center") == "Cell"} == items.keys() & of_edges
             for field, item in items.items():
