@@ -475,7 +475,7 @@ class Trajectory:
         raise TendrilError(f"nothing is called '{name}'; there are: {_listed(names)}")
 
     def to_xarray(self):
-        """An xarray.Dataset of all fields, in memory: dimensions time, vertex, edge, cell, and xyz or director."""
+        """An xarray.Dataset of all fields, in memory: dimensions time, vertex, edge, cell, and xyz, or axis of pairs."""
         try:
             import xarray
         except ImportError:
@@ -484,7 +484,7 @@ class Trajectory:
         variables = {}
         for name in self._fields:
             field = self.field(name)
-            components = {1: (), 3: ("xyz",), 2: ("director",)}[field.shape[2] if field.ndim == 3 else 1]
+            components = {1: (), 3: ("xyz",), 2: ("axis",)}[field.shape[2] if field.ndim == 3 else 1]
             variables[name] = ("time", dimension[field.place], *components), field[:], {"units": field.unit}
         coordinates = {"time": ("time", self.time, {"units": self.unit("time")}), "xyz": ["x", "y", "z"]}
         for place in ("vertices", "edges"):

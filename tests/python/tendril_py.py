@@ -272,6 +272,7 @@ def wrong_input(folder):
         data = t.to_xarray()
         assert np.array_equal(data["velocity"], t.field("velocity")) and data["moment"].attrs["units"] == "N m"
         assert data["position"].dims == ("time", "vertex", "xyz") and data["vertex_rod"].values[-1] == "cable"
+        assert sorted(data.data_vars) == sorted(PLACES) and data["curvature"].dims == ("time", "vertex", "axis")
 
 
 with tempfile.TemporaryDirectory() as main, tempfile.TemporaryDirectory() as other:
