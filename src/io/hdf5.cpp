@@ -18,6 +18,17 @@ template <class Id> Id checked(Id id, const std::string &what) {
   return id;
 }
 
+/// Whoever reads a file looks into it for a moment, which keeps it from being locked; another run stays.
+template <class Open> hid_t patiently(Open open) {
+  constexpr int most_tries = 20;
+  hid_t file = open();
+  for (int k = 1; file < 0 && k < most_tries; ++k) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(25));
+    file = open();
+  }
+  return file;
+}
+
 void attach(hid_t to, const std::string &name, const std::string &value) {
   const Hdf5Type type = H5Tcopy(H5T_C_S1);
   H5Tset_size(type, std::max<std::size_t>(value.size(), 1));
@@ -58,13 +69,7 @@ Hdf5File Hdf5File::create(const std::string &path) {
   f.path_ = path;
   Hdf5Properties access = H5Pcreate(H5P_FILE_ACCESS);
   H5Pset_libver_bounds(access, H5F_LIBVER_LATEST, H5F_LIBVER_LATEST); // what appending under readers needs
-  // Whoever waits for the file looks into it for a moment, which keeps it from being locked; another run stays.
-  constexpr int most_tries = 20;
-  hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
-  for (int k = 1; file < 0 && k < most_tries; ++k) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(25));
-    file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
-  }
+  const hid_t file = patiently([&] { return H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access); });
   f.file_ = checked(file, path + ": cannot be written; is another run using it?");
   return f;
 }
@@ -72,7 +77,8 @@ Hdf5File Hdf5File::create(const std::string &path) {
 Hdf5File Hdf5File::reopen(const std::string &path) {
   Hdf5File f;
   f.path_ = path;
-  f.file_ = checked(H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT), path + ": cannot be opened again; is another program using it?");
+  f.file_ =
+      checked(patiently([&] { return H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT); }), path + ": cannot be opened again; is another program using it?");
   return f;
 }
 
