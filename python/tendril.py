@@ -60,8 +60,17 @@ def _attributes(of):
     return {k: _text(v.item() if np.ndim(v) == 0 and hasattr(v, "item") else v) for k, v in of.attrs.items()}
 
 
+def _unlocked(path, shared):
+    """Opened so that no run is kept from writing. Older h5py or HDF5 cannot but lock, and what a process has open with
+    locks it cannot open without."""
+    try:
+        return h5py.File(path, "r", swmr=shared, locking=False)
+    except (TypeError, ValueError, OSError):
+        return h5py.File(path, "r", swmr=shared)
+
+
 def _open(path):
-    """The open file. A run that starts, or adds its estimate at the end, locks it for a moment."""
+    """The open file. A run that starts, or adds its estimate at the end, has it to itself for a moment."""
     try:
         with open(path, "rb") as f:
             head = f.read(9)
@@ -72,7 +81,7 @@ def _open(path):
     shared = head[8:] >= b"\x03"  # older kinds of HDF5 files know no reading while they grow
     for wait in [0.025] * 20 + [0]:
         try:
-            return h5py.File(path, "r", swmr=shared)
+            return _unlocked(path, shared)
         except (OSError, ValueError, RuntimeError) as e:
             reason = str(e).split("\n")[0]
             clock.sleep(wait)
@@ -179,7 +188,7 @@ class Rods(Sequence):
     """The rods by number or name."""
 
     def __init__(self, trajectory, kind=Rod):
-        self._t, self._kind, self._numbers = trajectory, kind, None
+        self._t, self._kind = trajectory, kind
 
     def __len__(self):
         return len(self._t._static["name"])
@@ -190,13 +199,11 @@ class Rods(Sequence):
     def __getitem__(self, key):
         if isinstance(key, slice):
             return [self[k] for k in range(len(self))[key]]
-        names = self._t._static["name"]
+        names, numbers = self._t._static["name"], self._t._static["number"]
         if isinstance(key, str):
-            if self._numbers is None:
-                self._numbers = {name: k for k, name in enumerate(names)}
-            if key not in self._numbers:
+            if key not in numbers:
                 raise TendrilError(f"there is no rod '{key}'; there are: {_listed(names)}")
-            return self._kind(self._t, self._numbers[key])
+            return self._kind(self._t, numbers[key])
         if not -len(self) <= key < len(self):
             raise TendrilError(f"there is no rod {key}; there are {len(self)}: {_listed(names)}")
         return self._kind(self._t, int(key) % len(self))
@@ -323,17 +330,21 @@ class Trajectory:
 
     def __init__(self, path):
         self.path = os.path.join(path, "trajectory.h5") if os.path.isdir(path) else os.fspath(path)
+        self._read()
+
+    def _read(self):
         self._file = _open(self.path)
         try:
             self._check()
             self._load()
             self._look()
-        except (OSError, KeyError, RuntimeError) as e:
-            self.close()
-            raise TendrilError(f"{self.path}: is damaged or incomplete ({str(e).strip(chr(34))})") from None
         except TendrilError:
             self.close()
             raise
+        except Exception as e:  # of any kind where a new run begins over the file
+            self.close()
+            reason = str(e).split("\n")[0].strip('"')
+            raise TendrilError(f"{self.path}: is damaged or incomplete ({reason})") from None
 
     def _check(self):
         if _text(self._file.attrs.get("format", "")) != "tendril-trajectory":
@@ -363,7 +374,7 @@ class Trajectory:
             "half_axes": f["rods/half_axes"][:] if "rods" in f else np.full((count, 2), np.nan),
             "material": {name: data[:] for name, data in f["material"].items()},
         }
-        self.rods = Rods(self)
+        self._static["number"] = {name: k for k, name in enumerate(self._static["name"])}
         self.supports = []
         if "supports" in f:
             starts = self._static["vertices"]
@@ -386,9 +397,15 @@ class Trajectory:
                 _text(data.attrs.get(key)) for key in ("place", "unit"))
             if place in PLACES:
                 self._fields[name] = place, unit
-        self.bodies, self.colliders = (
-            [Thing(self, group, k) for k in range(len(self._file[group]["shape"]))] if group in self._file else []
-            for group in ("bodies", "colliders"))
+
+    # Made when asked for: without circular references a file is closed as soon as its Trajectory is let go.
+    rods = property(lambda self: Rods(self))
+    bodies = property(lambda self: self._things("bodies"))
+    colliders = property(lambda self: self._things("colliders"))
+
+    def _things(self, group):
+        count = len(self._file[group]["shape"]) if group in self._file else 0
+        return [Thing(self, group, k) for k in range(count)]
 
     def _dataset(self, name):
         """A dataset as it is now, to be let go at once: HDF5 keeps one view of a file for all readers of a process,
@@ -410,8 +427,7 @@ class Trajectory:
     def refresh(self):
         """Sees what the run has added. Returns the number of complete frames."""
         self.close()
-        self._file = _open(self.path)
-        self._look()
+        self._read()
         return len(self.time)
 
     def close(self):
@@ -475,7 +491,7 @@ class Trajectory:
         raise TendrilError(f"nothing is called '{name}'; there are: {_listed(names)}")
 
     def to_xarray(self):
-        """An xarray.Dataset of all fields, in memory: dimensions time, vertex, edge, cell, and xyz, or axis of pairs."""
+        """An xarray.Dataset of all fields, in memory: dimensions time, vertex, edge, cell; xyz, or axis of pairs."""
         try:
             import xarray
         except ImportError:
