@@ -1,12 +1,8 @@
 """From a trajectory to shapes: which frames, which values, which colours."""
 import numpy as np
+from tendril import Trajectory
 
 from .shapes import RECTANGLE, bar, body, ellipse, join, smoothed, tube
-
-try:
-    from tendril import Trajectory
-except ImportError:
-    from .stand_in import Trajectory
 
 OF_OUR_OWN = ("time", "rod")  # values that every trajectory has
 

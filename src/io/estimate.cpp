@@ -175,13 +175,13 @@ void writeEstimate(const std::string &path, const Estimate &e) {
   file.createGroup("estimate");
   file.writeAttribute("estimate", "valid", int(e.none.empty()));
   if (!e.critical.empty()) {
-    file.write("estimate/critical_load_factor", {e.critical.size()}, e.critical.data());
-    file.write("estimate/critical_error", {e.critical.size()}, e.critical_error.data());
+    file.write("estimate/critical_load_factor", {e.critical.size()}, e.critical.data(), "1");
+    file.write("estimate/critical_error", {e.critical.size()}, e.critical_error.data(), "1");
   }
   if (!e.none.empty()) return file.writeAttribute("estimate", "reason", e.none);
   const hsize_t n = e.position.size();
-  file.write("estimate/position", {n, 3}, e.position[0].data());
-  file.write("estimate/error", {n}, e.error.data());
+  file.write("estimate/position", {n, 3}, e.position[0].data(), "m");
+  file.write("estimate/error", {n}, e.error.data(), "m");
   const RodEstimate &worst = e.rods[e.worstRod()];
   file.writeAttribute("estimate", "position_error", worst.error);
   file.writeAttribute("estimate", "relative_position_error", worst.error / worst.length);

@@ -18,6 +18,17 @@ template <class Id> Id checked(Id id, const std::string &what) {
   return id;
 }
 
+/// Whoever reads a file looks into it for a moment, which keeps it from being locked; another run stays.
+template <class Open> hid_t patiently(Open open) {
+  constexpr int most_tries = 20;
+  hid_t file = open();
+  for (int k = 1; file < 0 && k < most_tries; ++k) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(25));
+    file = open();
+  }
+  return file;
+}
+
 void attach(hid_t to, const std::string &name, const std::string &value) {
   const Hdf5Type type = H5Tcopy(H5T_C_S1);
   H5Tset_size(type, std::max<std::size_t>(value.size(), 1));
@@ -58,13 +69,7 @@ Hdf5File Hdf5File::create(const std::string &path) {
   f.path_ = path;
   Hdf5Properties access = H5Pcreate(H5P_FILE_ACCESS);
   H5Pset_libver_bounds(access, H5F_LIBVER_LATEST, H5F_LIBVER_LATEST); // what appending under readers needs
-  // Whoever waits for the file looks into it for a moment, which keeps it from being locked; another run stays.
-  constexpr int most_tries = 20;
-  hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
-  for (int k = 1; file < 0 && k < most_tries; ++k) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(25));
-    file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
-  }
+  const hid_t file = patiently([&] { return H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access); });
   f.file_ = checked(file, path + ": cannot be written; is another run using it?");
   return f;
 }
@@ -72,7 +77,8 @@ Hdf5File Hdf5File::create(const std::string &path) {
 Hdf5File Hdf5File::reopen(const std::string &path) {
   Hdf5File f;
   f.path_ = path;
-  f.file_ = checked(H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT), path + ": cannot be opened again; is another program using it?");
+  f.file_ =
+      checked(patiently([&] { return H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT); }), path + ": cannot be opened again; is another program using it?");
   return f;
 }
 
@@ -101,11 +107,12 @@ void Hdf5File::createGroup(const std::string &name) {
   Hdf5Group(checked(H5Gcreate2(file_, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written"));
 }
 
-void Hdf5File::write(const std::string &name, const std::vector<hsize_t> &shape, const double *values) {
+void Hdf5File::write(const std::string &name, const std::vector<hsize_t> &shape, const double *values, const std::string &unit) {
   const Hdf5Space space = H5Screate_simple(int(shape.size()), shape.data(), nullptr);
   const Hdf5Dataset data =
       checked(H5Dcreate2(file_, name.c_str(), H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written");
   checked(H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), path_ + ": cannot be written");
+  if (!unit.empty()) attach(data, "unit", unit);
 }
 
 void Hdf5File::write(const std::string &name, const std::vector<hsize_t> &shape, const int *values) {
@@ -114,16 +121,38 @@ void Hdf5File::write(const std::string &name, const std::vector<hsize_t> &shape,
   checked(H5Dwrite(data, H5T_NATIVE_INT, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), path_ + ": cannot be written");
 }
 
+void Hdf5File::write(const std::string &name, const std::vector<std::string> &values) {
+  std::size_t width = 1;
+  for (const std::string &value : values) width = std::max(width, value.size());
+  std::string all;
+  for (const std::string &value : values) all.append(value).append(width - value.size(), '\0');
+  const hsize_t size = values.size();
+  writeStrings(name, Hdf5Space(H5Screate_simple(1, &size, nullptr)), width, all.data());
+}
+
+void Hdf5File::writeText(const std::string &name, const std::string &text) {
+  writeStrings(name, Hdf5Space(H5Screate(H5S_SCALAR)), std::max<std::size_t>(text.size(), 1), text.c_str());
+}
+
+void Hdf5File::writeStrings(const std::string &name, hid_t space, std::size_t width, const char *values) {
+  const Hdf5Type type = H5Tcopy(H5T_C_S1);
+  H5Tset_size(type, width);
+  H5Tset_cset(type, H5T_CSET_UTF8);
+  H5Tset_strpad(type, H5T_STR_NULLPAD);
+  const Hdf5Dataset data = checked(H5Dcreate2(file_, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written");
+  checked(H5Dwrite(data, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), path_ + ": cannot be written");
+}
+
 void Hdf5File::writeAttribute(const std::string &name, const std::string &value) { attach(file_, name, value); }
 void Hdf5File::writeAttribute(const std::string &name, const std::vector<double> &values) { attach(file_, name, values); }
 void Hdf5File::writeAttribute(const std::string &name, int value) { attach(file_, name, value); }
 
-void Hdf5File::writeAttribute(const std::string &group, const std::string &name, const std::string &value) { attach(groupAt(group), name, value); }
-void Hdf5File::writeAttribute(const std::string &group, const std::string &name, double value) { attach(groupAt(group), name, value); }
-void Hdf5File::writeAttribute(const std::string &group, const std::string &name, int value) { attach(groupAt(group), name, value); }
+void Hdf5File::writeAttribute(const std::string &object, const std::string &name, const std::string &value) { attach(objectAt(object), name, value); }
+void Hdf5File::writeAttribute(const std::string &object, const std::string &name, double value) { attach(objectAt(object), name, value); }
+void Hdf5File::writeAttribute(const std::string &object, const std::string &name, int value) { attach(objectAt(object), name, value); }
 
-Hdf5Group Hdf5File::groupAt(const std::string &name) const {
-  return checked(H5Gopen2(file_, name.c_str(), H5P_DEFAULT), path_ + ": has no group '" + name + "'");
+Hdf5Object Hdf5File::objectAt(const std::string &name) const {
+  return checked(H5Oopen(file_, name.c_str(), H5P_DEFAULT), path_ + ": has nothing of the name '" + name + "'");
 }
 
 Hdf5Series::Hdf5Series(const Hdf5File &file, const std::string &name, const std::vector<hsize_t> &slab, bool integer) : extent_(slab) {

@@ -256,7 +256,7 @@ PetscErrorCode refuseUnknownOptions() {
   fail(unknown, "unknown or unused" + (near.empty() ? "" : "; did you mean -" + near + "?") + " (-help lists all options)");
 }
 
-void writeOptionsFile(const std::string &path, const Options &o, const Provenance &p, const Scene &scene) {
+std::string writeOptionsFile(const std::string &path, const Options &o, const Provenance &p, const Scene &scene) {
   YAML::Emitter out;
   out.SetDoublePrecision(17);
   auto list = [&](auto begin, auto end) {
@@ -327,7 +327,9 @@ void writeOptionsFile(const std::string &path, const Options &o, const Provenanc
   out << YAML::EndSeq;
   put("petsc_options", p.options);
   out << YAML::EndMap;
-  std::ofstream(path) << out.c_str() << "\n";
+  const std::string text = std::string(out.c_str()) + "\n";
+  std::ofstream(path) << text;
+  return text;
 }
 
 } // namespace tendril

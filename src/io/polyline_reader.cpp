@@ -109,11 +109,18 @@ std::vector<Polyline> readHdf5(const std::string &path) {
   return lines;
 }
 
-} // namespace
-
-std::vector<Polyline> readPolylines(const std::string &path) {
+std::string extensionOf(const std::string &path) {
   std::string extension = std::filesystem::path(path).extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(), ::tolower);
+  return extension;
+}
+
+} // namespace
+
+bool isTextPolyline(const std::string &path) { return extensionOf(path) != ".h5" && extensionOf(path) != ".hdf5"; }
+
+std::vector<Polyline> readPolylines(const std::string &path) {
+  const std::string extension = extensionOf(path);
   std::ifstream file(path);
   if (!file || std::filesystem::is_directory(path)) throw SceneError(path + ": cannot be opened; check the path (it is relative to the scene file)");
   std::vector<Polyline> lines;
@@ -121,7 +128,7 @@ std::vector<Polyline> readPolylines(const std::string &path) {
     lines = readPoints(file, path);
   else if (extension == ".obj")
     lines = readObj(file, path);
-  else if (extension == ".h5" || extension == ".hdf5")
+  else if (!isTextPolyline(path))
     lines = readHdf5(path);
   else
     throw SceneError(path + ": unknown kind of file '" + extension + "'; use .csv, .txt, .obj, .h5 or .hdf5");

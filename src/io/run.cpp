@@ -106,6 +106,7 @@ void requireHeld(const Scene &scene) {
 /// A scene ready to run; and as written, when it may have to be drawn again.
 struct Prepared {
   std::unique_ptr<Simulation> run;
+  SceneSource source;
   Scene written;
   std::vector<Drawing> drawings;
 };
@@ -122,6 +123,7 @@ PetscErrorCode setUp(Prepared &prepared, Options &o) {
   PetscFunctionBeginUser;
   PetscCall(PetscLogStagePush(events().setup));
   SceneFile file = readScene(o.scene, o.overrides);
+  prepared.source = std::move(file.source);
   if (o.gravity) file.scene.gravity = *o.gravity;
   resolve(file.run, o);
   if (!o.loop.dynamic) requireHeld(file.scene);
@@ -223,8 +225,9 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, int *exi
     if (!(run.state.time < o.loop.t_end))
       throw SceneError("option -restart: the checkpoint is at time " + std::to_string(run.state.time) + ", nothing is left to do; write a larger -t_end");
   }
-  const Provenance origin = provenance(argc, argv);
-  writeOptionsFile(o.output_dir + "/options.yaml", o, origin, run.scene);
+  Provenance origin = provenance(argc, argv);
+  origin.scene = std::move(prepared.source);
+  origin.effective_options = writeOptionsFile(o.output_dir + "/options.yaml", o, origin, run.scene);
   Progress progress(o.loop.t_end, o.output_dir + "/log.txt");
   progress.say(origin.command_line);
   std::istringstream groups(groupsText(run.scene));

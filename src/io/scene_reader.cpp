@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 
 namespace tendril {
 namespace {
@@ -309,22 +311,39 @@ void readRun(const YamlValue &value, RunSettings &run) {
   map.finish();
 }
 
+std::string contentOf(const std::filesystem::path &path, const std::string &mistake) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw SceneError(path.string() + mistake);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// The polyline files of the rods; HDF5 files are no text.
+void keepFiles(const YamlValue &rods, SceneSource &source) {
+  for (const YamlValue &rod : rods.items()) {
+    const YAML::Node node = rod.node()["file"];
+    if (!node) continue;
+    const std::string path = node.Scalar();
+    const std::filesystem::path place = std::filesystem::path(rods.file()).parent_path() / path;
+    const bool seen = std::any_of(source.files.begin(), source.files.end(), [&](const auto &file) { return file.first == path; });
+    if (!seen && isTextPolyline(place.string())) source.files.emplace_back(path, contentOf(place, ": cannot be read again"));
+  }
+}
+
 } // namespace
 
 SceneFile readScene(const std::string &path, const Overrides &overrides) {
   YAML::Node root;
+  SceneFile out;
   try {
     if (std::filesystem::is_directory(path)) throw SceneError(path + ": is a folder; give a scene file with -scene");
-    const std::vector<YAML::Node> documents = YAML::LoadAllFromFile(path);
+    out.source.text = contentOf(path, ": cannot be opened; give an existing scene file with -scene");
+    const std::vector<YAML::Node> documents = YAML::LoadAll(out.source.text);
     if (documents.empty() || documents[0].IsNull()) throw SceneError(path + ":1: is empty; a scene needs at least 'rods'");
     if (documents.size() > 1) throw SceneError(path + ":" + std::to_string(documents[1].Mark().line + 1) + ": a second document begins here; a scene is one");
     root = documents[0];
-  } catch (const YAML::BadFile &) {
-    throw SceneError(path + ": cannot be opened; give an existing scene file with -scene");
   } catch (const YAML::Exception &e) {
     throw SceneError(path + ":" + std::to_string(e.mark.line + 1) + ": not valid YAML: " + e.msg);
   }
-  SceneFile out;
   YamlMap map(YamlValue(root, path, "scene"));
   out.scene.gravity = map.vector("gravity");
   if (map.has("rotation")) {
@@ -341,6 +360,7 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
   if (map.has("loads"))
     for (const YamlValue &v : map.at("loads").items()) readLoad(v, out.scene);
   map.finish();
+  keepFiles(map.at("rods"), out.source);
   return out;
 }
 

@@ -4,14 +4,17 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <sstream>
 
 namespace tendril {
 namespace {
 
 enum class On { vertices, edges, cells };
+constexpr const char *places[] = {"vertices", "edges", "cells"};
 
 /// A frame about to be written: a state and what is derived from it, as far as some field needs it.
 struct Snapshot {
@@ -22,7 +25,7 @@ struct Snapshot {
 enum class From { state, second_word, strains, actions };
 
 struct Field {
-  const char *name;
+  const char *name, *unit;
   On place;
   hsize_t components;
   From source;
@@ -30,19 +33,19 @@ struct Field {
 };
 
 const Field fields[] = {
-    {"position", On::vertices, 3, From::state, [](const Snapshot &s) { return s.state.position[0].data(); }},
-    {"director", On::edges, 3, From::state, [](const Snapshot &s) { return s.state.director[0].data(); }},
-    {"velocity", On::vertices, 3, From::state, [](const Snapshot &s) { return s.state.velocity[0].data(); }},
-    {"twist_rate", On::edges, 1, From::state, [](const Snapshot &s) { return s.state.twist_rate.data(); }},
-    {"axial_force", On::edges, 1, From::state, [](const Snapshot &s) { return s.state.axial_force.data(); }},
+    {"position", "m", On::vertices, 3, From::state, [](const Snapshot &s) { return s.state.position[0].data(); }},
+    {"director", "1", On::edges, 3, From::state, [](const Snapshot &s) { return s.state.director[0].data(); }},
+    {"velocity", "m/s", On::vertices, 3, From::state, [](const Snapshot &s) { return s.state.velocity[0].data(); }},
+    {"twist_rate", "rad/s", On::edges, 1, From::state, [](const Snapshot &s) { return s.state.twist_rate.data(); }},
+    {"axial_force", "N", On::edges, 1, From::state, [](const Snapshot &s) { return s.state.axial_force.data(); }},
     // Measure `angle`: 2 pi x whole turns of each cell's twist [rad].
-    {"turns", On::cells, 1, From::state, [](const Snapshot &s) { return s.state.turns.data(); }},
-    {"position_low", On::vertices, 3, From::second_word, [](const Snapshot &s) { return s.state.position_low[0].data(); }},
-    {"curvature", On::vertices, 2, From::strains, [](const Snapshot &s) { return s.strains.curvature[0].data(); }},
-    {"twist", On::vertices, 1, From::strains, [](const Snapshot &s) { return s.strains.twist.data(); }},
-    {"strain_energy_density", On::vertices, 1, From::strains, [](const Snapshot &s) { return s.strains.strain_energy_density.data(); }},
-    {"force", On::edges, 3, From::actions, [](const Snapshot &s) { return s.actions.force[0].data(); }},
-    {"moment", On::vertices, 3, From::actions, [](const Snapshot &s) { return s.actions.moment[0].data(); }},
+    {"turns", "rad", On::cells, 1, From::state, [](const Snapshot &s) { return s.state.turns.data(); }},
+    {"position_low", "m", On::vertices, 3, From::second_word, [](const Snapshot &s) { return s.state.position_low[0].data(); }},
+    {"curvature", "1/m", On::vertices, 2, From::strains, [](const Snapshot &s) { return s.strains.curvature[0].data(); }},
+    {"twist", "rad/m", On::vertices, 1, From::strains, [](const Snapshot &s) { return s.strains.twist.data(); }},
+    {"strain_energy_density", "J/m", On::vertices, 1, From::strains, [](const Snapshot &s) { return s.strains.strain_energy_density.data(); }},
+    {"force", "N", On::edges, 3, From::actions, [](const Snapshot &s) { return s.actions.force[0].data(); }},
+    {"moment", "N m", On::vertices, 3, From::actions, [](const Snapshot &s) { return s.actions.moment[0].data(); }},
 };
 
 std::vector<std::string> namesOf(bool derived) {
@@ -57,10 +60,35 @@ constexpr std::size_t most_waiting = 4 << 20;             ///< [bytes]
 
 std::array<int, 3> sizes(const Elements &e) { return {e.vertices(), e.edges(), int(e.cell_slot.size())}; }
 
-template <class Get> std::vector<double> perRod(const Scene &scene, Get get) {
-  std::vector<double> values;
-  for (const Rod &rod : scene.rods) values.push_back(get(rod.material));
-  return values;
+const char *nameOf(SectionShape shape) {
+  switch (shape) {
+  case SectionShape::circle:
+    return "circle";
+  case SectionShape::ellipse:
+    return "ellipse";
+  case SectionShape::rectangle:
+    return "rectangle";
+  }
+  return "none";
+}
+
+const char *nameOf(Support::Kind kind) {
+  switch (kind) {
+  case Support::Kind::clamp:
+    return "clamp";
+  case Support::Kind::pin:
+    return "pin";
+  case Support::Kind::fix_twist:
+    return "fix_twist";
+  }
+  return "";
+}
+
+/// Radius of a tube that stands for a rod: the mean of the half axes, or without a section that of a homogeneous round rod of its stiffnesses; 0 for
+/// a cable.
+double radiusOf(const Material &m) {
+  if (m.section) return (m.section->halfAxes()[0] + m.section->halfAxes()[1]) / 2;
+  return 2 * std::sqrt((m.flexural_stiffness[0] + m.flexural_stiffness[1]) / 2 / m.axial_stiffness);
 }
 
 } // namespace
@@ -93,6 +121,11 @@ const std::vector<std::string> &Diagnostics::names() {
                                               "rejected_iterations",
                                               "rounding_error"};
   return names;
+}
+
+const std::vector<std::string> &Diagnostics::units() {
+  static const std::vector<std::string> units{"s", "s", "J", "J", "J", "J", "J", "J", "1", "1", "1", "1", "s", "1", "1", "1"};
+  return units;
 }
 
 std::vector<double> Diagnostics::values() const {
@@ -133,14 +166,21 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
     if (slab[0] == 0) continue; // cables have no cells
     if (f.components > 1) slab.push_back(f.components);
     state_.back() = std::make_unique<Hdf5Series>(file_, std::string("state/") + f.name, slab);
+    file_.writeAttribute(std::string("state/") + f.name, "unit", std::string(f.unit));
+    file_.writeAttribute(std::string("state/") + f.name, "place", std::string(places[std::size_t(f.place)]));
   }
   file_.createGroup("diagnostics");
-  for (const std::string &name : Diagnostics::names())
-    diagnostics_.push_back(std::make_unique<Hdf5Series>(file_, "diagnostics/" + name, std::vector<hsize_t>{}));
+  for (std::size_t k = 0; k < Diagnostics::names().size(); ++k) {
+    const std::string path = "diagnostics/" + Diagnostics::names()[k];
+    diagnostics_.push_back(std::make_unique<Hdf5Series>(file_, path, std::vector<hsize_t>{}));
+    file_.writeAttribute(path, "unit", !dynamic && k < 2 ? "1" : Diagnostics::units()[k]); // in statics time is the load factor
+  }
   file_.createGroup("critical");
   critical_ = std::make_unique<Hdf5Series>(file_, "critical/load_factor", std::vector<hsize_t>{});
+  file_.writeAttribute("critical/load_factor", "unit", std::string("1"));
   step_ = std::make_unique<Hdf5Series>(file_, "step", std::vector<hsize_t>{}, true);
   time_ = std::make_unique<Hdf5Series>(file_, "time", std::vector<hsize_t>{});
+  file_.writeAttribute("time", "unit", std::string(dynamic ? "s" : "1"));
   file_.startAppending();
 }
 
@@ -155,30 +195,27 @@ TrajectoryWriter::~TrajectoryWriter() {
 
 void TrajectoryWriter::writeHeader(const Scene &scene, const Elements &elements, const Provenance &p) {
   file_.writeAttribute("format", std::string("tendril-trajectory"));
-  file_.writeAttribute("format_version", 1);
+  file_.writeAttribute("format_version", 2);
   file_.writeAttribute("gravity", std::vector<double>(scene.gravity.data(), scene.gravity.data() + 3));
-  file_.writeAttribute("tendril_version", p.version);
-  file_.writeAttribute("git_commit", p.git_commit);
-  file_.writeAttribute("petsc_version", p.petsc_version);
-  file_.writeAttribute("command_line", p.command_line);
-  file_.writeAttribute("options", p.options);
-  file_.writeAttribute("created", p.created);
-  file_.writeAttribute("ranks", p.ranks);
+  writeOrigin(p);
 
   const hsize_t nr = scene.rods.size();
   std::vector<int> vertex_offsets{0}, edge_offsets{0}, closed, ends;
-  std::vector<double> position, director;
+  std::vector<double> position, director, radius;
   for (std::size_t r = 0; r < nr; ++r) {
+    const Rod &rod = scene.rods[r];
     vertex_offsets.push_back(vertex_offsets.back() + elements.rods[r].vertices);
     edge_offsets.push_back(edge_offsets.back() + elements.rods[r].edges);
-    closed.push_back(scene.rods[r].closed);
-    for (const Vec3 &x : scene.rods[r].position) position.insert(position.end(), x.data(), x.data() + 3);
-    for (const Vec3 &d : scene.rods[r].director) director.insert(director.end(), d.data(), d.data() + 3);
+    closed.push_back(rod.closed);
+    for (const Vec3 &x : rod.position) position.insert(position.end(), x.data(), x.data() + 3);
+    for (const Vec3 &d : rod.director) director.insert(director.end(), d.data(), d.data() + 3);
+    radius.insert(radius.end(), rod.position.size(), radiusOf(rod.material));
   }
   for (int i = 0; i < edges_; ++i) ends.insert(ends.end(), {elements.vertex0[i], elements.vertex1[i]});
   file_.createGroup("topology");
   file_.write("topology/rod_vertex_offsets", {nr + 1}, vertex_offsets.data());
   file_.write("topology/rod_edge_offsets", {nr + 1}, edge_offsets.data());
+  file_.write("topology/rod_cell_offsets", {nr + 1}, elements.rod_cells.data());
   file_.write("topology/closed", {nr}, closed.data());
   file_.write("topology/edges", {hsize_t(edges_), 2}, ends.data());
   // The rods in XDMF's code for mixed cells: 2 for a polyline, its number of points, the points; a ring ends where it began.
@@ -191,19 +228,79 @@ void TrajectoryWriter::writeHeader(const Scene &scene, const Elements &elements,
   polyline_entries_ = polylines.size();
   file_.write("topology/polylines", {polyline_entries_}, polylines.data());
   file_.createGroup("reference");
-  file_.write("reference/position", {hsize_t(vertices_), 3}, position.data());
-  file_.write("reference/director", {hsize_t(edges_), 3}, director.data());
+  file_.write("reference/position", {hsize_t(vertices_), 3}, position.data(), "m");
+  file_.write("reference/director", {hsize_t(edges_), 3}, director.data(), "1");
+  file_.write("reference/radius", {hsize_t(vertices_)}, radius.data(), "m");
+  writeRods();
+  writeSupports();
+  writeMaterials();
+}
+
+void TrajectoryWriter::writeOrigin(const Provenance &p) {
+  file_.writeAttribute("tendril_version", p.version);
+  file_.writeAttribute("git_commit", p.git_commit);
+  file_.writeAttribute("petsc_version", p.petsc_version);
+  file_.writeAttribute("command_line", p.command_line);
+  file_.writeAttribute("options", p.options);
+  file_.writeAttribute("created", p.created);
+  file_.writeAttribute("ranks", p.ranks);
+  file_.writeText("scene", p.scene.text);
+  file_.writeText("options", p.effective_options);
+  if (p.scene.files.empty()) return;
+  file_.createGroup("scene_files"); // by number: paths have slashes, which HDF5 takes for groups
+  for (std::size_t k = 0; k < p.scene.files.size(); ++k) {
+    const std::string name = "scene_files/" + std::to_string(k);
+    file_.writeText(name, p.scene.files[k].second);
+    file_.writeAttribute(name, "path", p.scene.files[k].first);
+  }
+}
+
+void TrajectoryWriter::writeRods() {
+  std::vector<std::string> names, sections;
+  std::vector<double> half_axes;
+  for (const Rod &rod : scene_.rods) {
+    const std::optional<Section> &section = rod.material.section;
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    const std::array<double, 2> axes = section ? section->halfAxes() : std::array{nan, nan};
+    names.push_back(rod.name);
+    sections.push_back(section ? nameOf(section->shape) : "none");
+    half_axes.insert(half_axes.end(), axes.begin(), axes.end());
+  }
+  file_.createGroup("rods");
+  file_.write("rods/name", names);
+  file_.write("rods/section", sections);
+  file_.write("rods/half_axes", {rods_, 2}, half_axes.data(), "m");
+}
+
+void TrajectoryWriter::writeSupports() {
+  if (scene_.supports.empty()) return;
+  std::vector<int> vertices;
+  std::vector<std::string> types;
+  for (const Support &support : scene_.supports) {
+    vertices.push_back(elements_.rods[support.rod].first_vertex + support.vertex);
+    types.push_back(nameOf(support.kind));
+  }
+  file_.createGroup("supports");
+  file_.write("supports/vertex", {vertices.size()}, vertices.data());
+  file_.write("supports/type", types);
+}
+
+void TrajectoryWriter::writeMaterials() {
   file_.createGroup("material");
-  auto writeMaterial = [&](const char *name, auto get) { file_.write(std::string("material/") + name, {nr}, perRod(scene, get).data()); };
-  writeMaterial("linear_density", [](const Material &m) { return m.linear_density; });
-  writeMaterial("linear_rotational_inertia", [](const Material &m) { return m.linear_rotational_inertia; });
-  writeMaterial("axial_stiffness", [](const Material &m) { return m.axial_stiffness; });
-  writeMaterial("torsional_stiffness", [](const Material &m) { return m.torsional_stiffness; });
-  writeMaterial("mass_damping_coefficient", [](const Material &m) { return m.mass_damping_coefficient; });
-  writeMaterial("stiffness_damping_coefficient", [](const Material &m) { return m.stiffness_damping_coefficient; });
+  auto write = [&](const char *name, const char *unit, auto get) {
+    std::vector<double> values;
+    for (const Rod &rod : scene_.rods) values.push_back(get(rod.material));
+    file_.write(std::string("material/") + name, {rods_}, values.data(), unit);
+  };
+  write("linear_density", "kg/m", [](const Material &m) { return m.linear_density; });
+  write("linear_rotational_inertia", "kg m", [](const Material &m) { return m.linear_rotational_inertia; });
+  write("axial_stiffness", "N", [](const Material &m) { return m.axial_stiffness; });
+  write("torsional_stiffness", "N m^2", [](const Material &m) { return m.torsional_stiffness; });
+  write("mass_damping_coefficient", "1/s", [](const Material &m) { return m.mass_damping_coefficient; });
+  write("stiffness_damping_coefficient", "s", [](const Material &m) { return m.stiffness_damping_coefficient; });
   std::vector<double> flexural;
-  for (const Rod &rod : scene.rods) flexural.insert(flexural.end(), rod.material.flexural_stiffness.begin(), rod.material.flexural_stiffness.end());
-  file_.write("material/flexural_stiffness", {nr, 2}, flexural.data());
+  for (const Rod &rod : scene_.rods) flexural.insert(flexural.end(), rod.material.flexural_stiffness.begin(), rod.material.flexural_stiffness.end());
+  file_.write("material/flexural_stiffness", {rods_, 2}, flexural.data(), "N m^2");
 }
 
 void TrajectoryWriter::writeFrame(const State &state) {
@@ -305,6 +402,9 @@ std::string TrajectoryWriter::xdmfFrame(bool edges) const {
   out << "    </Topology>\n    <Geometry GeometryType=\"XYZ\">\n";
   frameOf(fields[0]);
   out << "    </Geometry>\n";
+  out << "    <Attribute Name=\"radius\" AttributeType=\"Scalar\" Center=\"Node\">\n     ";
+  dataset("reference/radius", std::to_string(vertices_), "Float", 8);
+  out << "    </Attribute>\n";
   for (std::size_t k = 1; k < state_.size(); ++k) {
     const Field &f = fields[k];
     if (!state_[k] || f.place == On::cells || (f.place == On::edges && !edges)) continue;

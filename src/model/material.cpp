@@ -17,6 +17,18 @@ double rectangleTorsion(double width, double height) {
 
 } // namespace
 
+std::array<double, 2> Section::halfAxes() const {
+  switch (shape) {
+  case SectionShape::circle:
+    return {size[0], size[0]};
+  case SectionShape::ellipse:
+    return size;
+  case SectionShape::rectangle:
+    return {size[0] / 2, size[1] / 2};
+  }
+  return {};
+}
+
 SectionConstants sectionConstants(const Section &section) {
   using std::numbers::pi;
   const auto [p, q] = section.size;
@@ -36,6 +48,7 @@ SectionConstants sectionConstants(const Section &section) {
 Material homogeneousMaterial(const Section &section, double young, double shear, double density) {
   const SectionConstants c = sectionConstants(section);
   Material m;
+  m.section = section;
   m.linear_density = density * c.area;
   m.linear_rotational_inertia = density * c.polarMoment();
   m.axial_stiffness = young * c.area;

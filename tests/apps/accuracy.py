@@ -6,10 +6,12 @@ import subprocess
 import sys
 import tempfile
 
-import h5py
 import numpy as np
 
 program, source = os.path.abspath(sys.argv[1]), os.path.abspath(sys.argv[2])
+sys.path.insert(0, source + "/python")
+from tendril import Trajectory
+
 exact = np.array([0.61237163927557, -0.713791523611913, 0])  # data/reference/elastica_tip_load.csv, load 5; of the scene elastica.yaml
 
 
@@ -21,26 +23,24 @@ def tendril(scene, out, *options, check=True):
 def run(scene, *options):
     with tempfile.TemporaryDirectory() as out:
         text = tendril(scene, out, *options).stdout
-        with h5py.File(out + "/trajectory.h5") as f:
-            estimate = {k: v[:] for k, v in f["estimate"].items()} if "estimate" in f else None
-            attributes = dict(f["estimate"].attrs) if "estimate" in f else {}
-            position = f["state/position"][-1]
+        with Trajectory(out) as t:
+            estimate, position = t.estimate, t.field("position")[-1]
         log, effective = open(out + "/log.txt").read(), open(out + "/options.yaml").read()
     assert all(line in log for line in text.splitlines() if "estimate" in line and "command" not in line), "the log misses a line"
-    return text, effective, position, estimate, attributes
+    return text, effective, position, estimate
 
 
-text, effective, x, estimate, attributes = run("elastica", "-error_estimate")
+text, effective, x, estimate = run("elastica", "-error_estimate")
 assert "estimated error: position" in text and "bend energy" in text, text
 assert estimate["position"].shape == x.shape and estimate["error"].shape == x.shape[:1]
 error = np.linalg.norm(x[-1] - exact)
 # The scene stretches by EI/(EA L^2) = 1e-8.
 assert abs(estimate["error"][-1] / error - 1) < 0.01 and np.linalg.norm(estimate["position"][-1] - exact) < error / 40, estimate["error"][-1] / error
-assert attributes["valid"] == 1 and attributes["position_error"] == estimate["error"].max()
+assert estimate["valid"] == 1 and estimate["position_error"] == estimate["error"].max()
 assert "error_estimate: true" in effective
 print("elastica: error", error, "estimated", estimate["error"][-1], "extrapolated", np.linalg.norm(estimate["position"][-1] - exact))
 
-text, effective, x, estimate, _ = run("elastica", "-accuracy", "1e-3", "-accuracy_of", "tip", "-error_estimate")
+text, effective, x, estimate = run("elastica", "-accuracy", "1e-3", "-accuracy_of", "tip", "-error_estimate")
 edges = len(x) - 1
 assert f"edges {edges} for 0.001: estimated error of the tip" in text, text
 assert re.search(rf"edges: {edges}\n", effective) and "accuracy: 0.001" in effective and "accuracy_of: tip" in effective, effective
@@ -48,10 +48,10 @@ error = np.linalg.norm(x[-1] - exact)
 assert 0.5e-3 < error < 1e-3 and abs(estimate["error"][-1] / error - 1) < 0.02, (error, estimate["error"][-1])
 print("elastica to 1e-3:", edges, "edges, error", error)
 
-text, _, x, estimate, _ = run("deep_arch", "-mode", "static", "-accuracy", "1e-2")  # points need not stay, but for the one in the middle that a force names
+text, _, x, estimate = run("deep_arch", "-mode", "static", "-accuracy", "1e-2")  # points need not stay, but for the one in the middle that a force names
 assert (len(x) - 1) % 2 == 0 and len(x) - 1 < 64 and estimate is None, len(x)
 
-text, _, x, estimate, _ = run("verify/hook", "-accuracy", "1e-3", "-error_estimate")  # graded edges, cut in two where their map says
+text, _, x, estimate = run("verify/hook", "-accuracy", "1e-3", "-error_estimate")  # graded edges, cut in two where their map says
 assert len(x) - 1 < 20 and 0.5e-3 < estimate["error"].max() / 1.464 < 1e-3, (len(x), estimate["error"].max())
 print("hook to 1e-3:", len(x) - 1, "edges, estimated", estimate["error"].max() / 1.464)
 
@@ -63,9 +63,9 @@ for integrator, tolerance in ("generalized_alpha", 1e-2), ("generalized_alpha", 
         options = ["-integrator", integrator, "-t_end", "1", "-output_interval", "0.05", "-accuracy", str(tolerance), "-accuracy_of", "tip"]
         text = tendril("cantilever", out, *options).stdout
         log, effective = open(out + "/log.txt").read(), open(out + "/options.yaml").read()
-        with h5py.File(out + "/trajectory.h5") as f:
-            t, tip, steps = f["time"][1:], f["state/position"][1:, -1], f["diagnostics/dt"][:]
-            edges = f["state/position"].shape[1] - 1
+        with Trajectory(out) as trajectory:
+            t, tip, steps = trajectory.time[1:], trajectory.field("position")[1:, -1], trajectory.diagnostics["dt"]
+            edges = trajectory.rods[0].edges
     dt = float(re.search(r"\ndt: (\S+)", effective)[1])
     assert np.allclose(steps, dt) and f"accuracy: dt {dt:.3g} ({len(steps)} steps)" in text and f"edges: {edges}\n" in effective, text
     assert all(line in log for line in text.splitlines() if line.startswith("accuracy:")) and "by the edges" in text, log
@@ -95,9 +95,9 @@ with tempfile.TemporaryDirectory() as out:
     text = tendril(out + "/scene.yaml", out, "-integrator", "bdf2", "-dt_adapt", "error", "-accuracy", "1e-2").stdout
     rtol = float(re.search(r"\ndt_rtol: (\S+)", open(out + "/options.yaml").read())[1])
     assert f"dt_rtol {rtol:.3g}, dt_atol {1e-3 * rtol:.3g}" in text and "'hair#0' and 2 like it" in text, text
-    with h5py.File(out + "/trajectory.h5") as f:
-        assert f["time"][-1] == 0.4
+    with Trajectory(out) as t:
+        assert t.time[-1] == 0.4
 
-text, _, _, _, attributes = run("cantilever", "-t_end", "0.05", "-error_estimate")
-assert ("time_error" in attributes) == ("added up" in text) and ("added up" in text) != ("no estimate" in text), text
+text, _, _, estimate = run("cantilever", "-t_end", "0.05", "-error_estimate")
+assert ("time_error" in (estimate or {})) == ("added up" in text) and ("added up" in text) != ("no estimate" in text), text
 print("dynamics:", [line for line in text.splitlines() if "estimate" in line][-1])

@@ -13,15 +13,17 @@ import h5py
 import numpy as np
 
 program, source = os.path.abspath(sys.argv[1]), os.path.abspath(sys.argv[2])
+sys.path.insert(0, source + "/python")
+from tendril import TendrilError, Trajectory
+
 scene = source + "/data/scenes/cantilever.yaml"
 
 
 def read(path):
-    with h5py.File(path, "r", swmr=True) as f:
-        n = len(f["time"])
-        fields = {k: f["state/" + k][:n] for k in f["state"]}
-        assert all(len(v) == n for v in fields.values()), "a field has fewer frames than /time"
-        return f["time"][:], fields
+    with Trajectory(path) as t:
+        fields = {name: t.field(name)[:] for name in t.field_names}
+        assert all(len(v) == len(t.time) for v in fields.values()), "a field has fewer frames than /time"
+        return t.time, fields
 
 
 def run(out, *options):
@@ -36,9 +38,9 @@ def complete(out, *options):
 def frames(out):
     """Frames that can be read now; none until the file has its first."""
     try:
-        with h5py.File(out + "/trajectory.h5", "r", swmr=True) as f:
-            return len(f["time"])
-    except OSError:
+        with Trajectory(out) as t:
+            return len(t.time)
+    except TendrilError:
         return 0
 
 
@@ -122,21 +124,17 @@ with tempfile.TemporaryDirectory() as tmp:
     live = tmp + "/live"
     process = subprocess.Popen(run(live, "-dt", "1e-3", "-output_interval", "0.05", "-t_end", "1000"), stdout=subprocess.DEVNULL)
     until(lambda: frames(live) > 0, process)
-    with h5py.File(live + "/trajectory.h5", "r", swmr=True) as f:
-        time_, position, wall = f["time"], f["state/position"], f["diagnostics/wall_seconds"]
+    with Trajectory(live) as t:
         lengths, sent = [1], [0.0]
 
         def grown():
-            time_.refresh()
-            return len(time_) > lengths[-1]
+            return t.refresh() > lengths[-1]
 
         while len(sent) < 4 or min(np.diff(sent[1:])) > 0.6:
             until(grown, process)
-            lengths.append(len(time_))
-            position.refresh()
-            wall.refresh()
-            sent.append(wall[-1])
-            assert np.isfinite(position[lengths[-1] - 1]).all() and time_[lengths[-1] - 1] == max(time_[: lengths[-1]])
+            lengths.append(len(t.time))
+            sent.append(t.diagnostics["wall_seconds"][-1])
+            assert np.isfinite(t.field("position")[-1]).all() and t.time[-1] == max(t.time)
             assert len(sent) < 50, sent
     kill(process)
     t, _ = read(live + "/trajectory.h5")
@@ -157,6 +155,9 @@ with tempfile.TemporaryDirectory() as tmp:
         for k, grid in enumerate(grids):
             items = {"position": grid.find("Geometry/DataItem")}
             items.update((a.get("Name"), a.find("DataItem")) for a in grid.findall("Attribute"))
+            name, path = items.pop("radius").text.split(":")
+            with h5py.File(short + "/" + name, "r", swmr=True) as h5:
+                assert h5[path].shape == f["position"].shape[1:2] and np.all(h5[path][:] == 0.005)  # of the section
             assert items.keys() == (f.keys() if block.get("Name") == "edges" else f.keys() - of_edges), items.keys()
             assert {a.get("Name") for a in grid.findall("Attribute") if a.get("Center") == "Cell"} == items.keys() & of_edges
             for field, item in items.items():

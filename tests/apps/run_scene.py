@@ -16,6 +16,8 @@ import shutil
 import subprocess
 import sys
 
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)) + "/../../python")
+
 
 def parse(text):
     source, wanted = text.rsplit(" = ", 1)
@@ -37,13 +39,15 @@ def number(source, output, folder):
         return float(found[-1]) if found else "not in the output"
     if folder is None:
         return "no --output_dir"
-    import h5py
+    from tendril import Trajectory
 
     name, indices = source.split()
     try:
-        with h5py.File(folder + "/trajectory.h5", "r") as f:
-            return float(f[name][tuple(int(i) for i in indices.split(","))])
-    except (OSError, KeyError, ValueError, IndexError, TypeError) as e:
+        with Trajectory(folder) as t:
+            group, _, name = name.rpartition("/")
+            values = {"state": t.field, "diagnostics": t.diagnostics.__getitem__, "critical": lambda _: t.critical, "": lambda _: t.time}
+            return float(values[group](name)[tuple(int(i) for i in indices.split(","))])
+    except (KeyError, ValueError, IndexError, TypeError) as e:
         return str(e)
 
 

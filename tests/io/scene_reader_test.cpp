@@ -44,6 +44,17 @@ TEST(SceneReader, DefaultsAreTheStiffnessParametersOfAThinRod) {
   EXPECT_TRUE(scene.supports.empty() && scene.forces.empty() && scene.moments.empty());
 }
 
+TEST(SceneReader, KeepsTheTextOfTheSceneAndOfTheFilesThatItNames) {
+  const Folder folder;
+  const std::string points = "0 0 0\n1 0 0\n";
+  folder.write("line.csv", points);
+  const std::string text = "rods:\n  - {file: line.csv}\n  - {file: line.csv, copies: {count: 2, offset: [0, 1, 0]}}\n  - {" + line + "}\n";
+  const SceneSource source = readScene(folder.write("scene.yaml", text)).source;
+  EXPECT_EQ(source.text, text);
+  ASSERT_EQ(source.files.size(), 1u);
+  EXPECT_EQ(source.files[0], (std::pair<std::string, std::string>("line.csv", points)));
+}
+
 TEST(SceneReader, SimulationBlock) {
   const RunSettings run = read("simulation: {mode: static, dt: 0.25, t_end: 3, load_steps: 7}\nrods:\n  - " + line + "\n").run;
   EXPECT_EQ(run.mode, "static");

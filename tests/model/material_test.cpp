@@ -73,5 +73,12 @@ TEST(Material, RotationalInertiaIsThatOfTheSecondMoments) {
   EXPECT_NEAR(flat.linear_rotational_inertia, 1100 * 0.03 * 0.002 * (0.03 * 0.03 + 0.002 * 0.002) / 12, 1e-12 * flat.linear_density);
 }
 
+TEST(Section, HalfAxesLieAlongTheDirectors) {
+  EXPECT_EQ((Section{SectionShape::circle, {0.1, 0}}.halfAxes()), (std::array{0.1, 0.1}));
+  EXPECT_EQ((Section{SectionShape::ellipse, {0.2, 0.1}}.halfAxes()), (std::array{0.2, 0.1}));
+  EXPECT_EQ((Section{SectionShape::rectangle, {0.2, 0.1}}.halfAxes()), (std::array{0.1, 0.05}));
+  EXPECT_FALSE(Material{}.section);
+}
+
 } // namespace
 } // namespace tendril::test

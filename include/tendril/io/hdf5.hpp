@@ -28,6 +28,7 @@ private:
   hid_t id_;
 };
 using Hdf5Group = Hdf5Handle<H5Gclose>;
+using Hdf5Object = Hdf5Handle<H5Oclose>;
 using Hdf5Dataset = Hdf5Handle<H5Dclose>;
 using Hdf5Space = Hdf5Handle<H5Sclose>;
 using Hdf5Properties = Hdf5Handle<H5Pclose>;
@@ -50,22 +51,27 @@ public:
   std::vector<double> read(const std::string &name, hsize_t columns) const;
 
   void createGroup(const std::string &name);
-  void write(const std::string &name, const std::vector<hsize_t> &shape, const double *values);
+  /// \param unit becomes the attribute `unit`, if not empty
+  void write(const std::string &name, const std::vector<hsize_t> &shape, const double *values, const std::string &unit = "");
   void write(const std::string &name, const std::vector<hsize_t> &shape, const int *values);
+  /// A list of strings, UTF-8, padded with zeros to the longest.
+  void write(const std::string &name, const std::vector<std::string> &values);
+  void writeText(const std::string &name, const std::string &text);
   void writeAttribute(const std::string &name, const std::string &value);
   void writeAttribute(const std::string &name, const std::vector<double> &values);
   void writeAttribute(const std::string &name, int value);
-  /// Of a group.
-  void writeAttribute(const std::string &group, const std::string &name, const std::string &value);
-  void writeAttribute(const std::string &group, const std::string &name, double value);
-  void writeAttribute(const std::string &group, const std::string &name, int value);
+  /// Of a group or dataset.
+  void writeAttribute(const std::string &object, const std::string &name, const std::string &value);
+  void writeAttribute(const std::string &object, const std::string &name, double value);
+  void writeAttribute(const std::string &object, const std::string &name, int value);
   hid_t id() const { return file_; }
 
 private:
   Hdf5Handle<H5Fclose> file_;
   std::string path_;
 
-  Hdf5Group groupAt(const std::string &name) const;
+  void writeStrings(const std::string &name, hid_t space, std::size_t width, const char *values);
+  Hdf5Object objectAt(const std::string &name) const;
 };
 
 /// A dataset that grows by one slab per append: shape (n, slab...). Small slabs wait in memory until flush() and are then written at once; large

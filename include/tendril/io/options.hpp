@@ -43,7 +43,7 @@ void resolve(const RunSettings &scene, Options &options);
 /// Refuses options that nobody has asked for; call when the solvers are set up. \throws SceneError
 PetscErrorCode refuseUnknownOptions();
 
-/// Writes all that is in force, PETSc's options included, as YAML.
-void writeOptionsFile(const std::string &path, const Options &options, const Provenance &provenance, const Scene &scene);
+/// Writes all that is in force, PETSc's options included, as YAML, and returns what it wrote.
+std::string writeOptionsFile(const std::string &path, const Options &options, const Provenance &provenance, const Scene &scene);
 
 } // namespace tendril

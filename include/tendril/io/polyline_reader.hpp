@@ -26,4 +26,7 @@ struct Polyline {
 /// \throws SceneError with file and line
 std::vector<Polyline> readPolylines(const std::string &path);
 
+/// Whether a polyline file is text, by its extension: any but HDF5.
+bool isTextPolyline(const std::string &path);
+
 } // namespace tendril

@@ -15,8 +15,15 @@ struct RunSettings {
   int load_steps = 1;
 };
 
+/// What a scene was read from.
+struct SceneSource {
+  std::string text;
+  std::vector<std::pair<std::string, std::string>> files; ///< path as written and content of each text file that it names
+};
+
 struct SceneFile {
   Scene scene;
+  SceneSource source;
   std::vector<Drawing> drawings; ///< per rod
   RunSettings run;
 };

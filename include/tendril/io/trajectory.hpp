@@ -1,9 +1,10 @@
 #pragma once
 /// \file trajectory.hpp
-/// Trajectories: one HDF5 file that grows frame by frame (layout in docs/user.md) and the XDMF file by which ParaView reads it.
+/// Trajectories: one HDF5 file that grows frame by frame (layout in docs/reading_results.md) and the XDMF file by which ParaView reads it.
 
 #include "tendril/energy/term.hpp"
 #include "tendril/io/hdf5.hpp"
+#include "tendril/io/scene_reader.hpp"
 
 #include <chrono>
 #include <fstream>
@@ -20,17 +21,20 @@ struct Diagnostics {
   double dissipated = 0; ///< by the step, of kinetic and potential energy: what the loads and supports put in is counted too [J]
   int newton_iterations = 0, line_search_trials = 0, negative_pivots = 0, rejected_steps = 0;
   double wall_seconds = 0;
-  double rounding_error = 0; ///< what rounding keeps from the answer, over rod lengths; in dynamics summed over the steps (NewtonReport)
+  double rounding_error = 0;   ///< what rounding keeps from the answer, over rod lengths; in dynamics summed over the steps (NewtonReport)
   int rejected_iterations = 0; ///< Newton iterations of the rejected steps, which newton_iterations leaves out
   double error_estimate = 0;   ///< errors of all steps so far, each over the rod length, added up; 0 when not computed
 
   static const std::vector<std::string> &names();
+  static const std::vector<std::string> &units();
   std::vector<double> values() const;
 };
 
-/// Where a run came from; attributes of the trajectory.
+/// Where a run came from; attributes of the trajectory, and its datasets /scene, /scene_files and /options.
 struct Provenance {
   std::string command_line, options, git_commit, version, petsc_version, created;
+  SceneSource scene;
+  std::string effective_options; ///< text of options.yaml
   int ranks = 1;
 };
 
@@ -79,6 +83,10 @@ private:
   std::size_t described_ = 0;                ///< frames in the XDMF file
 
   void writeHeader(const Scene &scene, const Elements &elements, const Provenance &provenance);
+  void writeOrigin(const Provenance &provenance);
+  void writeRods();
+  void writeSupports();
+  void writeMaterials();
   std::string xdmfFrame(bool edges) const;
   void writeXdmf() const;
 };

@@ -3,8 +3,20 @@
 /// Stiffness, inertia and dissipation of a rod, per unit reference length.
 
 #include <array>
+#include <optional>
 
 namespace tendril {
+
+/// Shape of a homogeneous section. `size` is (radius, -), (semi-axis along the first director, along the second), or (width along the
+/// first director, height along the second) [m].
+enum class SectionShape { circle, ellipse, rectangle };
+struct Section {
+  SectionShape shape;
+  std::array<double, 2> size;
+  /// Half of the extent along the first and the second director [m].
+  std::array<double, 2> halfAxes() const;
+  bool operator==(const Section &) const = default;
+};
 
 /// Parameters of a rod and their defaults, SI units.
 struct Material {
@@ -15,18 +27,11 @@ struct Material {
   std::array<double, 2> flexural_stiffness{5e-4, 5e-4}; ///< about the first and the second director [N m^2]
   double mass_damping_coefficient = 0;                  ///< [1/s]
   double stiffness_damping_coefficient = 0;             ///< [s]
+  std::optional<Section> section = std::nullopt;        ///< none where only stiffness is given; for pictures, the mechanics do not use it
 
   /// A cable: bending and twist cost nothing and the rod carries no twist unknowns.
   bool isCable() const { return flexural_stiffness[0] == 0 && flexural_stiffness[1] == 0; }
   bool operator==(const Material &) const = default;
-};
-
-/// Shape of a homogeneous section. `size` is (radius, -), (semi-axis along the first director, along the second), or (width along the
-/// first director, height along the second) [m].
-enum class SectionShape { circle, ellipse, rectangle };
-struct Section {
-  SectionShape shape;
-  std::array<double, 2> size;
 };
 
 /// Geometric constants of a section: area [m^2], second moments about the first and second director, torsion constant [m^4].

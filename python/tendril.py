@@ -1,0 +1,512 @@
+"""Reads trajectories of tendril, also while a run writes them and after a kill. Needs numpy and h5py.
+
+    from tendril import Trajectory
+    t = Trajectory("out/helix")              # a folder, or its trajectory.h5
+    x = t.rods["spring"].position(-1)        # (vertices, 3) [m] in the last frame
+    v = t.field("velocity")[:, -1]           # (frames, 3) of the last vertex of all
+    y = t.at(0.3).rods[0].position()         # between frames
+
+docs/reading_results.md describes all of it, and the file. Mistakes raise TendrilError, with one line that tells what
+there is. The order of values is that of the scene: rods one after the other, each from its first vertex to its last.
+"""
+import os
+import re
+import time as clock
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import h5py
+import numpy as np
+
+FORMATS = (1, 2)
+PLACES = ("vertices", "edges", "cells")
+
+# Place and unit of what is in files of format 1; later ones tell by themselves.
+FORMAT_1_FIELDS = {
+    "position": ("vertices", "m"), "director": ("edges", "1"), "velocity": ("vertices", "m/s"),
+    "twist_rate": ("edges", "rad/s"), "axial_force": ("edges", "N"), "turns": ("cells", "rad"),
+    "position_low": ("vertices", "m"), "curvature": ("vertices", "1/m"), "twist": ("vertices", "rad/m"),
+    "strain_energy_density": ("vertices", "J/m"), "force": ("edges", "N"), "moment": ("vertices", "N m"),
+}
+FORMAT_1_UNITS = {
+    "time": "s", "diagnostics/time": "s", "diagnostics/dt": "s", "diagnostics/wall_seconds": "s",
+    **{f"diagnostics/{name}": "J" for name in ("kinetic", "stretch", "bend", "twist", "gravity", "dissipated")},
+    "material/linear_density": "kg/m", "material/linear_rotational_inertia": "kg m", "material/axial_stiffness": "N",
+    "material/torsional_stiffness": "N m^2", "material/flexural_stiffness": "N m^2",
+    "material/mass_damping_coefficient": "1/s", "material/stiffness_damping_coefficient": "s",
+    "reference/position": "m", "estimate/position": "m", "estimate/error": "m",
+}
+
+
+class TendrilError(ValueError):
+    """What is wrong with a file, or with what was asked of it, in one line."""
+
+
+def _listed(names):
+    names = [str(n) for n in names]
+    return ", ".join(names[:20]) + (f" and {len(names) - 20} more" if len(names) > 20 else "") if names else "none"
+
+
+def _text(value):
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+
+
+def _texts(dataset):
+    return [_text(v) for v in dataset[:].tolist()]
+
+
+def _attributes(of):
+    """Numbers, texts and arrays by name."""
+    return {k: _text(v.item() if np.ndim(v) == 0 and hasattr(v, "item") else v) for k, v in of.attrs.items()}
+
+
+def _unlocked(path, shared):
+    """Opened so that no run is kept from writing. Older h5py or HDF5 cannot but lock, and what a process has open with
+    locks it cannot open without."""
+    try:
+        return h5py.File(path, "r", swmr=shared, locking=False)
+    except (TypeError, ValueError, OSError):
+        return h5py.File(path, "r", swmr=shared)
+
+
+def _open(path):
+    """The open file. A run that starts, or adds its estimate at the end, has it to itself for a moment."""
+    try:
+        with open(path, "rb") as f:
+            head = f.read(9)
+    except OSError as e:
+        raise TendrilError(f"{path}: {'there is no such file' if e.errno == 2 else e.strerror}") from None
+    if head[:8] != b"\x89HDF\r\n\x1a\n":
+        raise TendrilError(f"{path}: is " + ("not an HDF5 file" if head else "empty; has its run begun?"))
+    shared = head[8:] >= b"\x03"  # older kinds of HDF5 files know no reading while they grow
+    for wait in [0.025] * 20 + [0]:
+        try:
+            return _unlocked(path, shared)
+        except (OSError, ValueError, RuntimeError) as e:
+            reason = str(e).split("\n")[0]
+            clock.sleep(wait)
+    raise TendrilError(f"{path}: cannot be opened; is it whole, or does a run just start? ({reason})")
+
+
+class Field:
+    """A field of all rods, at `place`: vertices, edges or cells; indices read from the file what they ask for.
+
+    field[frame], field[first:last, vertex], numpy.asarray(field). Shape: (frames, n), or (frames, n, components).
+    """
+
+    def __init__(self, trajectory, name):
+        self._t, self.name = trajectory, name
+        self.place, self.unit = trajectory._fields[name]
+
+    @property
+    def shape(self):
+        return (len(self._t.time), *self._data.shape[1:])
+
+    dtype = property(lambda self: self._data.dtype)
+    ndim = property(lambda self: self._data.ndim)
+    _data = property(lambda self: self._t._dataset("state/" + self.name))
+
+    def __getitem__(self, index):
+        index = index if isinstance(index, tuple) else (index,)
+        if index and all(_is_integer(i) or (isinstance(i, slice) and (i.step or 1) > 0) for i in index):
+            return self._data[(self._t._frame(index[0]), *index[1:])]
+        return self._data[: len(self)][index]
+
+    def __len__(self):
+        return len(self._t.time)
+
+    def __iter__(self):
+        return (self[k] for k in range(len(self)))
+
+    def __array__(self, dtype=None, copy=None):
+        return np.asarray(self[:], dtype)
+
+    def __repr__(self):
+        return f"<field {self.name} [{self.unit}] of {self.place}, {self.shape}>"
+
+
+def _is_integer(i):
+    return isinstance(i, (int, np.integer))
+
+
+class Rod:
+    """One rod: what does not change, and its part of the fields. Frames are numbers (-1 is the last) or slices.
+
+    name, closed; vertices, edges: how many; first_vertex, first_edge: their numbers in fields of all rods;
+    section: circle, ellipse, rectangle, none (only stiffness was given), or unknown (format 1);
+    half_axes (2,) [m] along the first and second director, nan without a section;
+    radius [m]: mean of the half axes; without them that of a homogeneous round rod of this stiffness, 2 sqrt(EI/EA),
+    or nan for cables;
+    material: its parameters by name, units by Trajectory.unit.
+    """
+
+    def __init__(self, trajectory, index):
+        s = trajectory._static
+        self._t, self.index = trajectory, index
+        self.name, self.closed = s["name"][index], bool(s["closed"][index])
+        self._slices = {place: slice(*s[place][index : index + 2]) for place in PLACES if s[place] is not None}
+        self.first_vertex, self.first_edge = self._slices["vertices"].start, self._slices["edges"].start
+        self.vertices = self._slices["vertices"].stop - self.first_vertex
+        self.edges = self._slices["edges"].stop - self.first_edge
+        self.section, self.half_axes = s["section"][index], s["half_axes"][index]
+        self.material = {name: values[index] for name, values in s["material"].items()}
+        self.radius = float(self.half_axes.mean())
+        bending = np.mean(self.material["flexural_stiffness"])
+        if np.isnan(self.radius) and bending > 0:
+            self.radius = float(2 * np.sqrt(bending / self.material["axial_stiffness"]))
+
+    def field(self, name, frame=-1):
+        """Values (n,) or (n, components) of a field; with a slice of frames, these come first."""
+        field = self._t.field(name)
+        return field[frame, self._slice(field.place)]
+
+    def position(self, frame=-1):
+        """(vertices, 3) [m]."""
+        return self.field("position", frame)
+
+    def director(self, frame=-1):
+        """First directors (edges, 3)."""
+        return self.field("director", frame)
+
+    def reference(self, name):
+        """`position` (vertices, 3) [m] or `director` (edges, 3) as drawn; `radius` (vertices,) [m], 0 for a cable."""
+        names = list(self._t._file["reference"])
+        if name not in names:
+            raise TendrilError(f"there is no reference '{name}'; there are: {_listed(names)}")
+        return self._t._dataset("reference/" + name)[self._slices["edges" if name == "director" else "vertices"]]
+
+    def _slice(self, place):
+        if place not in self._slices:
+            raise TendrilError(f"files of format 1 do not tell which {place} are those of rod '{self.name}'")
+        return self._slices[place]
+
+    def __repr__(self):
+        return f"<rod '{self.name}', {self.vertices} vertices>"
+
+
+class Rods(Sequence):
+    """The rods by number or name."""
+
+    def __init__(self, trajectory, kind=Rod):
+        self._t, self._kind = trajectory, kind
+
+    def __len__(self):
+        return len(self._t._static["name"])
+
+    def __iter__(self):
+        return (self._kind(self._t, k) for k in range(len(self)))
+
+    def __getitem__(self, key):
+        if isinstance(key, slice):
+            return [self[k] for k in range(len(self))[key]]
+        names, numbers = self._t._static["name"], self._t._static["number"]
+        if isinstance(key, str):
+            if key not in numbers:
+                raise TendrilError(f"there is no rod '{key}'; there are: {_listed(names)}")
+            return self._kind(self._t, numbers[key])
+        if not -len(self) <= key < len(self):
+            raise TendrilError(f"there is no rod {key}; there are {len(self)}: {_listed(names)}")
+        return self._kind(self._t, int(key) % len(self))
+
+
+@dataclass(frozen=True)
+class Support:
+    """What holds a vertex: clamp, pin or fix_twist. `vertex` counts over all rods, `rod_vertex` on its own."""
+
+    vertex: int
+    type: str
+    rod: str
+    rod_vertex: int
+
+
+class Thing:
+    """A body or a collider. shape: plane, sphere, box, capsule or mesh, with its parameters (k,); of a mesh `vertices`
+    (n, 3) [m] and `triangles` (m, 3), otherwise None; mass [kg] and inertia (3, 3) [kg m^2] of bodies, or None."""
+
+    def __init__(self, trajectory, group, index):
+        self._t, self._kind, self.index = trajectory, {"bodies": "body", "colliders": "collider"}[group], index
+        self._group = group
+        data = trajectory._file[group]
+        self.shape = _texts(data["shape"])[index]
+        self.name = _texts(data["name"])[index] if "name" in data else f"{self._kind}{index}"
+        parameters = data["parameters"][index] if "parameters" in data else np.zeros(0)
+        self.parameters = parameters[~np.isnan(parameters)]
+        self.mass, self.inertia = (data[key][index] if key in data else None for key in ("mass", "inertia"))
+        mesh = data.get(f"meshes/{index}")
+        self.vertices, self.triangles = (mesh[key][:] if mesh else None for key in ("vertices", "triangles"))
+
+    def pose(self, frame=-1):
+        """Position (3,) [m] and rotation (4,), a unit quaternion whose first component is the real one."""
+        return self._moving("position", np.zeros(3), frame), self._moving("rotation", np.array([1.0, 0, 0, 0]), frame)
+
+    def _moving(self, key, rest, frame):
+        state, at_rest = f"state/{self._kind}_{key}", f"{self._group}/{key}"
+        if state in self._t._file:
+            return self._t._dataset(state)[self._t._frame(frame), self.index]
+        return self._t._dataset(at_rest)[self.index] if at_rest in self._t._file else rest
+
+    def __repr__(self):
+        return f"<{self._kind} '{self.name}', {self.shape}>"
+
+
+def _unit_vectors(v, instead):
+    size = np.linalg.norm(v, axis=-1, keepdims=True)
+    return np.where(size > 0, v / np.where(size > 0, size, 1), instead)
+
+
+class Moment:
+    """The state at a time between frames: `time`, `rods`, `bodies`, `colliders`, `field(name)` of all rods.
+
+    Linear between the two frames; directors and rotations are normalised, whole turns are those of the frame before.
+    """
+
+    def __init__(self, trajectory, time):
+        times = trajectory.time
+        if not len(times):
+            raise TendrilError(f"{trajectory.path}: has no frame yet")
+        if np.any(np.diff(times) < 0):
+            raise TendrilError("load factors of this run fall and rise: choose frames by number")
+        slack = 1e-9 * max(abs(times[0]), abs(times[-1]))  # of sums of steps
+        if not times[0] - slack <= time <= times[-1] + slack:
+            raise TendrilError(f"there is nothing at time {time:g}; frames go from {times[0]:g} to {times[-1]:g}")
+        self._t, self.time = trajectory, float(np.clip(time, times[0], times[-1]))
+        self._before = int(np.searchsorted(times, self.time, side="right")) - 1
+        self._after = min(self._before + 1, len(times) - 1)
+        step = times[self._after] - times[self._before]
+        self._weight = (self.time - times[self._before]) / step if step > 0 else 0.0
+
+        def of_rod(_, index):
+            rod = Rod(trajectory, index)
+            rod.field = lambda name, frame=None: self._between(lambda k: Rod.field(rod, name, k), name)
+            return rod
+
+        self.rods = Rods(trajectory, of_rod)
+
+    bodies = property(lambda self: self._things(self._t.bodies))
+    colliders = property(lambda self: self._things(self._t.colliders))
+
+    def field(self, name):
+        """(n,) or (n, components)."""
+        field = self._t.field(name)
+        return self._between(lambda k: field[k], name)
+
+    def _between(self, at, name):
+        before = at(self._before)
+        if self._weight == 0 or name == "turns":
+            return before
+        value = (1 - self._weight) * before + self._weight * at(self._after)
+        return _unit_vectors(value, before) if name == "director" else value
+
+    def _things(self, things):
+        for thing in things:
+            thing.pose = lambda frame=None, thing=thing: self._pose(thing)
+        return things
+
+    def _pose(self, thing):
+        (x0, q0), (x1, q1) = Thing.pose(thing, self._before), Thing.pose(thing, self._after)
+        w, q1 = self._weight, q1 if q0 @ q1 >= 0 else -q1  # a rotation is two quaternions
+        return (1 - w) * x0 + w * x1, _unit_vectors((1 - w) * q0 + w * q1, q0)
+
+
+class Options(dict):
+    """Effective options as texts by name, without those of single rods; `text` is all of options.yaml."""
+
+    def __init__(self, text):
+        lines = re.findall(r"^(\w+): (.+)$", text, re.MULTILINE)
+        super().__init__((key, value.strip('"')) for key, value in lines)
+        self.text = text
+
+    def __str__(self):
+        return self.text
+
+
+class Trajectory:
+    """A trajectory.h5, given by its path or that of its folder.
+
+    path, format_version, attributes (those of the file: command line, version, ...), gravity (3,) [m/s^2];
+    rods, supports, bodies, colliders; scene: its text, or None; scene_files: texts that it names, by path as written;
+    options: Options. A frame counts once it is complete. What a run has added since is seen after refresh().
+    """
+
+    def __init__(self, path):
+        self.path = os.path.join(path, "trajectory.h5") if os.path.isdir(path) else os.fspath(path)
+        self._read()
+
+    def _read(self):
+        self._file = _open(self.path)
+        try:
+            self._check()
+            self._load()
+            self._look()
+        except TendrilError:
+            self.close()
+            raise
+        except Exception as e:  # of any kind where a new run begins over the file
+            self.close()
+            reason = str(e).split("\n")[0].strip('"')
+            raise TendrilError(f"{self.path}: is damaged or incomplete ({reason})") from None
+
+    def _check(self):
+        if _text(self._file.attrs.get("format", "")) != "tendril-trajectory":
+            raise TendrilError(f"{self.path}: is an HDF5 file, but not a trajectory of tendril")
+        self.format_version = int(self._file.attrs["format_version"])
+        if self.format_version not in FORMATS:
+            raise TendrilError(f"{self.path}: has format {self.format_version}, newer than {FORMATS[-1]}, which this "
+                               "tendril.py knows; use the one that came with the program")
+
+    def _load(self):
+        """What does not change."""
+        f = self._file
+        self.attributes = _attributes(f)
+        self.gravity = np.array(self.attributes["gravity"])
+        count = len(f["topology/closed"])
+        cells = f.get("topology/rod_cell_offsets")
+        turns = f.get("state/turns")
+        if cells is None and count == 1 and turns is not None:
+            cells = np.array([0, turns.shape[1]])
+        self._static = {
+            "closed": f["topology/closed"][:],
+            "vertices": f["topology/rod_vertex_offsets"][:].tolist(),
+            "edges": f["topology/rod_edge_offsets"][:].tolist(),
+            "cells": None if cells is None else cells[:].tolist(),
+            "name": _texts(f["rods/name"]) if "rods" in f else [f"rod{k}" for k in range(count)],
+            "section": _texts(f["rods/section"]) if "rods" in f else ["unknown"] * count,
+            "half_axes": f["rods/half_axes"][:] if "rods" in f else np.full((count, 2), np.nan),
+            "material": {name: data[:] for name, data in f["material"].items()},
+        }
+        self._static["number"] = {name: k for k, name in enumerate(self._static["name"])}
+        self.supports = []
+        if "supports" in f:
+            starts = self._static["vertices"]
+            for vertex, kind in zip(f["supports/vertex"][:].tolist(), _texts(f["supports/type"])):
+                rod = int(np.searchsorted(starts, vertex, side="right")) - 1
+                self.supports.append(Support(vertex, kind, self._static["name"][rod], vertex - starts[rod]))
+        self.scene = _text(f["scene"][()]) if "scene" in f else None
+        files = f["scene_files"].values() if "scene_files" in f else ()
+        self.scene_files = {_text(data.attrs["path"]): _text(data[()]) for data in files}
+        self.options = Options(_text(f["options"][()]) if "options" in f else self.attributes["options"])
+
+    def _look(self):
+        """What grows. The times go first: a frame is complete once its time is there."""
+        self._table = None
+        self.time = self._dataset("time")[:]
+        self.step = self._dataset("step")[: len(self.time)]
+        self._fields = {}
+        for name, data in self._file["state"].items():
+            place, unit = FORMAT_1_FIELDS.get(name, (None, None)) if self.format_version == 1 else (
+                _text(data.attrs.get(key)) for key in ("place", "unit"))
+            if place in PLACES:
+                self._fields[name] = place, unit
+
+    # Made when asked for: without circular references a file is closed as soon as its Trajectory is let go.
+    rods = property(lambda self: Rods(self))
+    bodies = property(lambda self: self._things("bodies"))
+    colliders = property(lambda self: self._things("colliders"))
+
+    def _things(self, group):
+        count = len(self._file[group]["shape"]) if group in self._file else 0
+        return [Thing(self, group, k) for k in range(count)]
+
+    def _dataset(self, name):
+        """A dataset as it is now, to be let go at once: HDF5 keeps one view of a file for all readers of a process,
+        and refreshes only what none of them holds."""
+        data = self._file[name]
+        if self._file.swmr_mode:
+            data.refresh()
+        return data
+
+    def _frame(self, index):
+        """A frame or a slice of frames as one that counts from 0 and ends with the last complete one."""
+        n = len(self.time)
+        if isinstance(index, slice):
+            return slice(*index.indices(n))
+        if not -n <= index < n:
+            raise TendrilError(f"there is no frame {index}; there are {n}, numbered from 0")
+        return int(index) % n
+
+    def refresh(self):
+        """Sees what the run has added. Returns the number of complete frames."""
+        self.close()
+        self._read()
+        return len(self.time)
+
+    def close(self):
+        self._file.close()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    @property
+    def field_names(self):
+        return list(self._fields)
+
+    def field(self, name):
+        """The Field of this name."""
+        if name not in self._fields:
+            raise TendrilError(f"there is no field '{name}'; there are: {_listed(self._fields)}")
+        return Field(self, name)
+
+    def at(self, time):
+        """The Moment at a time [s] within the run."""
+        return Moment(self, time)
+
+    @property
+    def diagnostics(self):
+        """A row per step with a value per column: diagnostics["kinetic"] (steps,); names in diagnostics.dtype.names."""
+        if self._table is None:
+            columns = {name: self._dataset("diagnostics/" + name)[:] for name in self._file["diagnostics"]}
+            rows = min(len(values) for values in columns.values())  # a run may write at this moment
+            self._table = np.empty(rows, [(name, values.dtype) for name, values in columns.items()])
+            for name, values in columns.items():
+                self._table[name] = values[:rows]
+        return self._table
+
+    @property
+    def critical(self):
+        """Critical load factors found in statics (n,); often none."""
+        return self._dataset("critical/load_factor")[:]
+
+    @property
+    def estimate(self):
+        """Estimated errors: datasets and attributes of /estimate by name; None until the run has ended with some."""
+        if "estimate" not in self._file:
+            return None
+        group = self._file["estimate"]
+        return {**{name: data[:] for name, data in group.items()}, **_attributes(group)}
+
+    def unit(self, name):
+        """Unit of a dataset: a field, column of the diagnostics, parameter of the material; 1 of pure numbers.
+        Of equal names a field goes first: `diagnostics/twist` is the energy [J]."""
+        groups = ("", "state/", "diagnostics/", "material/", "rods/", "reference/", "critical/", "estimate/")
+        for path in (group + name for group in groups):
+            if isinstance(self._file.get(path), h5py.Dataset):
+                if self.format_version > 1:
+                    return _text(self._file[path].attrs.get("unit", "1"))
+                field = FORMAT_1_FIELDS.get(path[6:]) if path.startswith("state/") else None
+                return field[1] if field else FORMAT_1_UNITS.get(path, "1")
+        names = [*self._fields, *self.diagnostics.dtype.names]
+        raise TendrilError(f"nothing is called '{name}'; there are: {_listed(names)}")
+
+    def to_xarray(self):
+        """An xarray.Dataset of all fields, in memory: dimensions time, vertex, edge, cell; xyz, or axis of pairs."""
+        try:
+            import xarray
+        except ImportError:
+            raise TendrilError("to_xarray needs xarray: apt-get install python3-xarray") from None
+        dimension = {"vertices": "vertex", "edges": "edge", "cells": "cell"}
+        variables = {}
+        for name in self._fields:
+            field = self.field(name)
+            components = {1: (), 3: ("xyz",), 2: ("axis",)}[field.shape[2] if field.ndim == 3 else 1]
+            variables[name] = ("time", dimension[field.place], *components), field[:], {"units": field.unit}
+        coordinates = {"time": ("time", self.time, {"units": self.unit("time")}), "xyz": ["x", "y", "z"]}
+        for place in ("vertices", "edges"):
+            rods = np.repeat(self._static["name"], np.diff(self._static[place]))
+            coordinates[dimension[place] + "_rod"] = dimension[place], rods
+        return xarray.Dataset(variables, coordinates, self.attributes)
+
+    def __repr__(self):
+        return f"<trajectory {self.path}, {len(self.rods)} rods, {len(self.time)} frames>"
