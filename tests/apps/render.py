@@ -215,7 +215,7 @@ def write(path, x, keep_open=False):
     f["topology/edges"] = np.stack([np.arange(n - 1), np.arange(1, n)], 1)
     f["material/axial_stiffness"], f["material/flexural_stiffness"] = np.array([1e5]), np.array([[10.0, 10.0]])
     f["reference/position"] = np.zeros((n, 3))
-    f.attrs.update({"gravity": [0, -9.81, 0], "format": "tendril-trajectory", "format_version": 1})
+    f.attrs.update({"gravity": [0, -9.81, 0], "format": "tendril-trajectory", "format_version": 1, "options": ""})
 
     def moving(name, v):
         f.create_dataset(name, data=v, maxshape=(None, *v.shape[1:]), chunks=(1, *v.shape[1:]))
@@ -223,6 +223,7 @@ def write(path, x, keep_open=False):
     moving("state/position", x)
     moving("state/director", np.tile([0, 0, 1.0], (frames, n - 1, 1)))
     moving("state/velocity", np.ones_like(x))
+    moving("step", np.arange(float(frames)))
     moving("time", np.arange(float(frames)))
     if not keep_open:
         f.close()
