@@ -112,6 +112,12 @@ std::string rulesOf(std::string_view block) {
   return {};
 }
 
+std::string enumSchema(const Key &key) {
+  std::string all;
+  for (const std::string &choice : choicesOf(key)) all += (all.empty() ? "" : ", ") + inQuotes(choice);
+  return "\"enum\": [" + all + "]";
+}
+
 std::string blockSchema(const std::string &block);
 
 std::string valueSchema(const Key &key) {
@@ -133,18 +139,10 @@ std::string valueSchema(const Key &key) {
   case KeyType::rows:
     return R"("type": "array", "minItems": 1, "items": {"type": "array", "items": {"type": "number"},
  "oneOf": [{"minItems": 4, "maxItems": 4}, {"minItems": 7, "maxItems": 7}]})";
-  case KeyType::word: {
-    std::string all;
-    for (const std::string &choice : choicesOf(key)) all += (all.empty() ? "" : ", ") + inQuotes(choice);
-    return "\"enum\": [" + all + "]";
-  }
+  case KeyType::word: return enumSchema(key);
   case KeyType::list: return "\"type\": \"array\", \"items\": {" + blockSchema(path + "[]") + "}" + (key.isRequired() ? ", \"minItems\": 1" : "");
   case KeyType::map: return blockSchema(path);
-  case KeyType::word_or_map: {
-    std::string all;
-    for (const std::string &choice : choicesOf(key)) all += (all.empty() ? "" : ", ") + inQuotes(choice);
-    return "\"anyOf\": [{\"enum\": [" + all + "]}, {" + blockSchema(path) + "}]";
-  }
+  case KeyType::word_or_map: return "\"anyOf\": [{" + enumSchema(key) + "}, {" + blockSchema(path) + "}]";
   }
   return {};
 }

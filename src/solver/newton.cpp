@@ -581,43 +581,40 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
     PetscCall(newton(&failure));
   // In statics the answer must be a minimum, and the Hessian there says how far from it the iterate still is.
   int rounds = 0;
-  for (int k = 0; is_static && failure.empty(); ++k) {
+  bool settled = false;
+  // Whether what is left is little; else Newton goes on to a sharper tolerance, `along` as it seeks.
+  auto settle = [&](Seek along) {
+    PetscFunctionBeginUser;
+    PetscCall(verify(&settled));
+    if (settled) PetscFunctionReturn(0);
+    if (++rounds == most_rounds) {
+      failure = lost_;
+      report_.lost = true;
+      PetscFunctionReturn(0);
+    }
+    sharpness_ *= 1e-2;
+    seek_ = along;
+    PetscCall(newton(&failure));
+    PetscFunctionReturn(0);
+  };
+  for (int k = 0; is_static && failure.empty() && !settled; ++k) {
     int negative;
     PetscCall(inertiaAtIterate(&negative));
     report_.negative_pivots = negative;
     if (k == 0) report_.first_negative_pivots = negative;
     if (seek == Seek::equilibrium && negative >= 0) break;
     if (negative == 0 || (negative > 0 && !potential_->scene().moments.empty())) { // couples: no minimum to speak of
-      bool little;
-      PetscCall(verify(&little));
-      if (little) break;
-      if (++rounds == most_rounds) {
-        failure = lost_;
-        report_.lost = true;
-        break;
-      }
-      sharpness_ *= 1e-2;
-      PetscCall(newton(&failure));
+      PetscCall(settle(seek_));
       continue;
     }
     bool left = false, neutral = false;
     if (negative > 0 && k < 10) PetscCall(escapeSaddle(&left, &neutral));
     if (neutral && !left) { // no way down, but what loads move along it has to be found
-      bool little;
       PetscCall(inertiaAtIterate(&negative));
-      PetscCall(verify(&little));
       report_.zero_pivots += std::max(0, negative);
       report_.negative_pivots = 0;
       if (k == 0) report_.first_negative_pivots = 0;
-      if (little) break;
-      if (++rounds == most_rounds) {
-        failure = lost_;
-        report_.lost = true;
-        break;
-      }
-      sharpness_ *= 1e-2;
-      seek_ = Seek::equilibrium; // Newton's own steps: a shift would drown the soft direction
-      PetscCall(newton(&failure));
+      PetscCall(settle(Seek::equilibrium)); // Newton's own steps: a shift would drown the soft direction
       continue;
     }
     seek_ = seek;
