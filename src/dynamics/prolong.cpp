@@ -12,21 +12,6 @@ struct TwistRates {
   std::vector<double> before, after;
 };
 
-/// Edge of a rod at a slot, or -1 where a support's frame is.
-int edgeAt(const RodRange &rod, int slot) {
-  const int i = slot - rod.first_slot;
-  if (i >= 0 && i < rod.edges) return i;
-  return rod.closed && i == rod.edges ? 0 : -1;
-}
-
-/// Cells of a rod one by one, those of half edges too.
-std::vector<LooseCell> cellsOf(const Elements &elements, int r) {
-  std::vector<LooseCell> cells = elements.loose[r];
-  for (int s = elements.cell_begin[r]; s < elements.cell_end[r]; ++s)
-    if (elements.cellLength()[s] > 0) cells.push_back({s, s - 1, s, s}); // none where a clamp cuts the rod
-  return cells;
-}
-
 TwistRates twistRates(const Elements &elements, const Configuration &c, int r) {
   const RodRange &rod = elements.rods[r];
   const double none = std::nan("");
@@ -50,14 +35,13 @@ void setTurns(const std::vector<TwistRates> &rates, const Scene &fine, const Ele
     if (fine.rods[r].measure != Measure::angle) continue;
     const auto &[before, after] = rates[r];
     auto middle = [&](int edge) { return 0.5 * (before[edge] + after[edge]); };
-    const std::vector<LooseCell> &loose = elements.loose[r];
-    for (int n = elements.rod_cells[r]; n < elements.rod_cells[r + 1]; ++n) {
-      const int slot = elements.cell_slot[n];
-      const auto held = std::find_if(loose.begin(), loose.end(), [&](const LooseCell &one) { return one.slot == slot; });
-      const LooseCell cell = held != loose.end() ? *held : LooseCell{slot, slot - 1, slot, slot};
+    const std::vector<LooseCell> cells = cellsOf(elements, r);
+    for (std::size_t n = 0; n < cells.size(); ++n) {
+      const LooseCell &cell = cells[n];
+      const int slot = cell.slot;
       const int j = edgeAt(elements.rods[r], cell.frame0), k = edgeAt(elements.rods[r], cell.frame1);
       const double rate = j >= 0 ? (j % 2 == 0 ? middle(j / 2) : after[j / 2]) : k % 2 == 0 ? before[k / 2] : middle(k / 2);
-      state.turns[n] = 2 * pi * std::round((rate * elements.cellLength()[slot] - c[Configuration::twist][slot]) / (2 * pi));
+      state.turns[elements.rod_cells[r] + n] = 2 * pi * std::round((rate * elements.cellLength()[slot] - c[Configuration::twist][slot]) / (2 * pi));
     }
   }
 }

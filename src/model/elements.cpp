@@ -15,7 +15,8 @@ std::array<double, 3> integratedStrain(const Vec3 &strain, double length, Measur
 /// Makes the cells of one rod.
 class CellBuilder {
 public:
-  CellBuilder(const Scene &scene, int rod, Elements &out) : rod_(scene.rods[rod]), range_(out.rods[rod]), loose_(out.loose[rod]), out_(out), holder_(rod_.vertices(), nullptr) {
+  CellBuilder(const Scene &scene, int rod, Elements &out)
+      : rod_(scene.rods[rod]), range_(out.rods[rod]), loose_(out.loose[rod]), out_(out), holder_(rod_.vertices(), nullptr) {
     for (std::size_t s = 0; s < scene.supports.size(); ++s) {
       const Support &support = scene.supports[s];
       if (support.rod != rod || !support.holdsTwist()) continue;
@@ -37,7 +38,8 @@ public:
       const bool clamp = holder && holder->kind == Support::Kind::clamp;
       if (before >= 0 && after >= 0 && !clamp) {
         const Frame f0 = referenceFrame(rod_, before), f1 = referenceFrame(rod_, after);
-        add(place(v), f0, f1, 0.5 * (f0.length + f1.length), {0.5, 0.5}, {1, 1}, rod_.material.flexural_stiffness, holder ? 0.0 : rod_.material.torsional_stiffness);
+        add(place(v), f0, f1, 0.5 * (f0.length + f1.length), {0.5, 0.5}, {1, 1}, rod_.material.flexural_stiffness,
+            holder ? 0.0 : rod_.material.torsional_stiffness);
       }
       if (holder && before >= 0) addHalfCell(v, before, *holder, true);
       if (holder && after >= 0) addHalfCell(v, after, *holder, false);
@@ -101,7 +103,8 @@ private:
   }
 };
 
-Elements::Elements(const Scene &scene, const DofMap &dofs) : rods(dofs.rods()), slots(dofs.slots()), loose(rods.size()), support_slot(scene.supports.size(), -1), rod_cells{0} {
+Elements::Elements(const Scene &scene, const DofMap &dofs)
+    : rods(dofs.rods()), slots(dofs.slots()), loose(rods.size()), support_slot(scene.supports.size(), -1), rod_cells{0} {
   const int most = slots + 3 * int(scene.supports.size()); // a frame and two cells for each support along a rod
   constants_ = Planes(7, most);
   cells_ = Planes(cell_planes, most);
@@ -136,6 +139,23 @@ Elements::Elements(const Scene &scene, const DofMap &dofs) : rods(dofs.rods()), 
     }
     rod_cells.push_back(int(cell_slot.size()));
   }
+}
+
+std::vector<LooseCell> cellsOf(const Elements &elements, int rod) {
+  std::vector<LooseCell> cells;
+  auto loose = elements.loose[rod].begin(); // in scene order, too
+  for (int n = elements.rod_cells[rod]; n < elements.rod_cells[rod + 1]; ++n) {
+    const int slot = elements.cell_slot[n];
+    const bool held = loose != elements.loose[rod].end() && loose->slot == slot;
+    cells.push_back(held ? *loose++ : LooseCell{slot, slot - 1, slot, slot});
+  }
+  return cells;
+}
+
+int edgeAt(const RodRange &rod, int slot) {
+  const int i = slot - rod.first_slot;
+  if (i >= 0 && i < rod.edges) return i;
+  return rod.closed && i == rod.edges ? 0 : -1;
 }
 
 } // namespace tendril

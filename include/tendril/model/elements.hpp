@@ -50,6 +50,11 @@ private:
   friend class CellBuilder;
 };
 
+/// Cells of a rod one by one in scene order, those of half edges too.
+std::vector<LooseCell> cellsOf(const Elements &elements, int rod);
+/// Edge of a rod at the slot of a frame, or -1 where a support's is.
+int edgeAt(const RodRange &rod, int slot);
+
 /// Planes of Elements::cells().
 enum CellPlane : int { cell_stiffness = 0, cell_rest = 3, cell_weight = 6, cell_free = 8, cell_planes = 10 };
 
