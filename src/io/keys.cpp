@@ -191,7 +191,8 @@ std::string keysAsJson() {
   for (const Key &key : keys) {
     if (out.size() > 1) out += ",\n ";
     out += "{\"path\": " + inQuotes(key.path) + ", \"type\": " + inQuotes(typeName(key.type)) + ", \"unit\": " + inQuotes(key.unit) + ", \"fallback\": " + inQuotes(key.fallback) +
-           ", \"meaning\": " + inQuotes(key.meaning) + ", \"choices\": " + inQuotes(key.choices) + ", \"example\": " + inQuotes(key.example) + ", \"group\": " + inQuotes(key.group);
+           ", \"meaning\": " + inQuotes(key.meaning) + ", \"choices\": " + inQuotes(key.choices) + ", \"example\": " + inQuotes(key.example) + ", \"group\": " + inQuotes(key.group) +
+           ", \"more\": " + inQuotes(key.more);
     if (std::isfinite(key.bounds.least)) out += ", \"least\": " + numberText(key.bounds.least) + ", \"above\": " + (key.bounds.above ? "true" : "false");
     if (std::isfinite(key.bounds.most)) out += ", \"most\": " + numberText(key.bounds.most) + ", \"below\": " + (key.bounds.below ? "true" : "false");
     out += "}";

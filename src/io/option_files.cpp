@@ -3,6 +3,7 @@
 #include "tendril/io/yaml.hpp"
 
 #include <cctype>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -81,15 +82,21 @@ void OptionFiles::readPlain(const std::string &file) {
 }
 
 void OptionFiles::read(int argc, char **argv) {
-  for (int i = 1; i < argc; ++i) {
-    const std::string option = argv[i];
+  std::vector<std::string> words; // in PETSc's order
+  if (const char *variable = std::getenv("PETSC_OPTIONS")) {
+    std::istringstream in(variable);
+    for (std::string word; in >> word;) words.push_back(word);
+  }
+  words.insert(words.end(), argv + 1, argv + argc);
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const std::string option = words[i];
     if (!isOption(option)) continue;
     if (option != "-options_file" && option != "-options_file_yaml") {
       places_.erase(option.substr(1)); // the last one counts
       continue;
     }
-    if (i + 1 == argc || isOption(argv[i + 1])) throw SceneError("option " + option + ": needs a file");
-    const std::string file = argv[++i];
+    if (i + 1 == words.size() || isOption(words[i + 1])) throw SceneError("option " + option + ": needs a file");
+    const std::string file = words[++i];
     if (file.find('$') != std::string::npos) continue; // a variable, which PETSc replaces
     const std::string named = "option " + option + ": '" + file;
     if (std::filesystem::is_directory(file)) throw SceneError(named + "' is a folder; give a file");

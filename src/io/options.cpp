@@ -29,7 +29,7 @@ public:
   PetscErrorCode read() {
     PetscFunctionBeginUser;
     for (const Key &key : keys)
-      if (key.isOption() && std::string_view(key.path).substr(0, 6) != "-snes_") PetscCall(readOne(key.path, key.type == KeyType::flag));
+      if (key.isOption()) PetscCall(readOne(key.path, key.type == KeyType::flag));
     for (const Key *key : rodOverrides()) PetscCall(readOne(("-rod_" + std::string(key->name())).c_str(), false));
     PetscFunctionReturn(0);
   }
@@ -188,10 +188,13 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   o->loop.mixed = texts.word("-stretch") == "mixed";
   o->loop.hessian = texts.word("-hessian") == "exact" ? HessianKind::exact : HessianKind::gauss_newton;
   for (const Key *key : rodOverrides())
-    if (const std::string name(key->name()); texts.isGiven("-rod_" + name)) o->overrides[name] = texts.given("-rod_" + name);
-  PetscReal rtol = 1;
-  PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-snes_rtol", &rtol, nullptr));
-  if (const std::string wrong = outOfBounds(*AnyKey("-snes_rtol"), rtol); !wrong.empty()) fail("snes_rtol", wrong + ": it is relative to the loads of each rod");
+    if (const std::string name(key->name()); texts.isGiven("-rod_" + name)) {
+      const std::string text = texts.given("-rod_" + name);
+      const bool bare = key->type == KeyType::pair && text.find(',') != std::string::npos && text[0] != '['; // as vectors are written
+      o->overrides[name] = bare ? "[" + text + "]" : text;
+    }
+  texts.number("-snes_rtol"); // PETSc reads them, with less to say about mistakes
+  texts.integer("-snes_max_it");
   PetscFunctionReturn(0);
 }
 

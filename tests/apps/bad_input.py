@@ -52,6 +52,7 @@ files = {
     "value.yaml": b"t_end: 0.02\ndt: fast\n",
     "override.yaml": b"rod_young: -1\n",
     "limit.yaml": b"snes_max_it: abc\n",
+    "stol.yaml": b"snes_stol: abc\n",
     "dash.yaml": b"-dt: 1e-3\n",
     "other.yaml": b"options_file: value.yaml\n",
     "case.yaml": b"t_end: 0.02\nscene: data/scenes/helix.yaml\n",
@@ -149,8 +150,8 @@ rows = [
     ("tolerance of nothing", None, ["-snes_rtol", "-1"], ["-snes_rtol", "(0, 1]"]),
     ("no such solver", None, ["-snes_type", "nosuch"], ["setting up the solvers", "nosuch"]),
     ("no such factorisation", None, ["-pc_factor_mat_solver_type", "nosuch"], ["setting up the solvers", "nosuch"]),
-    ("limit that is a word", None, ["-snes_max_it", "abc"], ["setting up the solvers", "abc"]),
-    ("tolerance that is a word", None, ["-snes_rtol", "abc"], ["command line", "abc"]),
+    ("limit that is a word", None, ["-snes_max_it", "abc"], ["-snes_max_it", "'abc' is not a number"]),
+    ("tolerance that is a word", None, ["-snes_rtol", "abc"], ["-snes_rtol", "abc"]),
     ("no checkpoint", None, ["-restart", "nowhere.h5"], ["nowhere.h5", "not a readable HDF5 file"]),
     ("checkpoint of nothing", None, ["-restart", "file"], ["file", "not a readable HDF5 file"]),
     ("half a checkpoint interval", None, ["-checkpoint_interval", "0.5"], ["-checkpoint_interval", "whole number"]),
@@ -226,6 +227,16 @@ rows = [
     ("NaN in HDF5", rod("file: nan.h5"), [], ["nan.h5", "'position'", "not finite"]),
     ("HDF5 offsets", rod("file: offsets.h5"), [], ["offsets.h5", "rise from 0 to 2"]),
     ("HDF5 closed", rod("file: closed.h5"), [], ["closed.h5", "'closed'", "one number per rod"]),
+    ("placed: nowhere", (shape, shape + "\n    place: {scale: 0}"), [], ["scene.yaml:", "greater than zero"]),
+    ("placed: three scales", (shape, shape + "\n    place: {scale: [1, 2, 3]}"), [], ["scene.yaml:", "'scale' must be a number", "a list of 3"]),
+    ("placed: an angle", (shape, shape + "\n    place: {rotation: 90}"), [], ["scene.yaml:", "'rotation' must be a list of 3 numbers"]),
+    ("placed: translate", (shape, shape + "\n    place: {translate: [0, 0, 1]}"), [], ["scene.yaml:", "did you mean 'translation'"]),
+    ("placed: out of sight", (shape, shape + "\n    place: {scale: 1e300}"), [], ["scene.yaml:", "too long"]),
+    ("placed: a list", (shape, shape + "\n    place: [1, 2]"), [], ["scene.yaml:", "'place' must be a map"]),
+    ("placed: nothing", (shape, shape + "\n    place: "), [], ["scene.yaml:", "'place' must be a map"]),
+    ("placed: twice", (shape, shape + "\n    place: {scale: 2, scale: 3}"), [], ["scene.yaml:", "a second time"]),
+    ("placed: of no size", (shape, shape + "\n    place: {scale: 1e-320}"), [], ["scene.yaml:", "zero length"]),
+    ("placed: with a unit", (shape, shape + "\n    place: {scale: 1mm}"), [], ["scene.yaml:", "must be a number", "'1mm'"]),
     # supports and loads
     ("unknown kind of support", ("type: clamp", "type: glue"), [], ["scene.yaml:8", "clamp, pin, fix_twist", "glue"]),
     ("support of nothing", (support, "  - {vertex: 0}"), [], ["scene.yaml:8", "needs the key 'type'"]),
@@ -246,6 +257,9 @@ rows = [
     ("folder is a file", None, ["-output_dir", "file"], ["-output_dir", "'file'", "cannot be written"]),
     ("override out of range", None, ["-rod_poisson", "0.7"], ["-rod_poisson", "(-1, 0.5]", "0.7"]),
     ("override with an open bracket", None, ["-rod_flexural_stiffness", "[1"], ["-rod_flexural_stiffness", "'[1'"]),
+    ("three stiffnesses of an override", None, ["-rod_flexural_stiffness", "1,2,3"], ["-rod_flexural_stiffness", "a list of 2 numbers", "a list of 3"]),
+    ("tolerance above one", None, ["-snes_rtol", "2"], ["-snes_rtol", "(0, 1]", "'2'"]),
+    ("no iteration", None, ["-snes_max_it", "0"], ["-snes_max_it", "at least 1"]),
     ("override of another section", None, ["-rod_width", "1"], ["scene.yaml:6", "one of 'radius'"]),
     ("measure of an override", None, ["-rod_measure", "sine"], ["-rod_measure", "tan, angle"]),
     ("no scene", None, ["-scene"], ["-scene"]),
@@ -289,7 +303,8 @@ rows = [
     ("options: unknown", None, ["-options_file", "unknown.yaml"], ["unknown.yaml:3", "-snes_rtl", "did you mean -snes_rtol"]),
     ("options: wrong value", None, ["-options_file", "value.yaml"], ["value.yaml:2", "-dt", "'fast' is not a number"]),
     ("options: wrong value of a rod", None, ["-options_file", "override.yaml"], ["override.yaml:1", "-rod_young", "greater than zero"]),
-    ("options: wrong value of PETSc's", None, ["-options_file", "limit.yaml"], ["setting up the solvers", "abc", "limit.yaml"]),
+    ("options: wrong limit", None, ["-options_file", "limit.yaml"], ["limit.yaml:1", "-snes_max_it", "'abc' is not a number"]),
+    ("options: wrong value of PETSc's", None, ["-options_file", "stol.yaml"], ["setting up the solvers", "abc", "stol.yaml"]),
     ("options: with a dash", None, ["-options_file", "dash.yaml"], ["dash.yaml:1", "'-dt'", "without their dash"]),
     ("options: another file", None, ["-options_file", "other.yaml"], ["other.yaml:1", "-options_file"]),
     ("options: case from another folder", None, ["-scene", "scene.yaml", "-options_file", "case.yaml"], ["case.yaml:2", "cannot be opened", "folder"]),
@@ -332,6 +347,10 @@ with ThreadPoolExecutor(4) as pool:  # a start takes longer than its work
 failures = len(complaints)
 for complaint in complaints:
     print(complaint)
+variable = subprocess.run([program], capture_output=True, text=True, env={**os.environ, "PETSC_OPTIONS": "-options_file nowhere.yaml"})
+if variable.returncode != 1 or "'nowhere.yaml' cannot be opened" not in variable.stderr:
+    failures += 1
+    print("PETSC_OPTIONS:", variable.stderr)
 help_text = subprocess.run([program, "-help"], capture_output=True, text=True)
 for option in "scene mode dt dt_min integrator rho_inf dt_adapt dt_rtol dt_atol dt_max t_end load_steps continuation bifurcation arclength_steps gravity output_dir output_interval output_fields error_estimate accuracy accuracy_of rounding_tolerance retraction stretch rod_young rod_measure".split():
     if f"-{option}" not in help_text.stdout or help_text.returncode != 0:

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""What the table of keys promises: keys.py <tendril> <source folder>. Defaults are those in force, completion completes."""
+"""What the table of keys promises: keys.py <tendril> <source folder>. Defaults are those in force, examples run,
+completion completes."""
 import json
 import os
 import subprocess
@@ -39,6 +40,75 @@ def defaults():
     assert compared > 15, f"only {compared} defaults were compared"
 
 
+def put(scene, path, value):
+    """Sets a value of a scene by its path, `rods[].line.edges`: the first of each list."""
+    *blocks, last = path.split(".")
+    for block in blocks:
+        scene = scene.setdefault(block.rstrip("[]"), [{}] if block.endswith("[]") else {})
+        scene = scene[0] if block.endswith("[]") else scene
+    scene.setdefault(last, value)
+
+
+def exampleScene(path, value):
+    """A scene with one key, and the keys that it asks for."""
+    scene = {}
+    put(scene, path, value)
+    blocks = [path.rsplit(".", k)[0] for k in range(1, path.count(".") + 1)]
+    for key in keys.values():
+        if key["fallback"] == "required" and key["path"].rpartition(".")[0] in blocks and key["example"]:
+            put(scene, key["path"], yaml.safe_load(key["example"]))
+    material, name = "rods[].material", path.rpartition(".")[2]
+    with_it = {"shear": ["young", "density"], "young": ["poisson", "density"], "poisson": ["young", "density"], "density": ["young", "poisson"],
+               "width": ["height", "young", "poisson", "density"], "height": ["width", "young", "poisson", "density"],
+               "radius": ["young", "poisson", "density"], "radii": ["young", "poisson", "density"]}
+    if path.startswith(material):
+        for other in with_it.get(name, []):
+            put(scene, f"{material}.{other}", yaml.safe_load(keys[f"{material}.{other}"]["example"]))
+        if name in ("shear", "young", "poisson", "density"):
+            put(scene, f"{material}.radius", 0.01)
+    if path.startswith("loads[]") and name in ("vertex", "rod"):
+        put(scene, "loads[].force", [0, 0, 1e-3])
+    if path == "loads[].edge":
+        put(scene, "loads[].torque", 1e-4)
+    if path.startswith("loads[]"):
+        put(scene, "loads[].edge" if name in ("torque", "moment", "edge") else "loads[].vertex", "last")
+    if path.startswith("supports[].motion"):
+        scene["supports"][0]["type"] = "clamp"
+    if not any(shape in scene.get("rods", [{}])[0] for shape in ("line", "ring", "helix", "points", "file")):
+        put(scene, "rods[].line", {"from": [0, 0, 0], "to": [1, 0, 0], "edges": 6})
+    put(scene, "supports[].rod", "all")
+    put(scene, "supports[].vertex", 0)
+    put(scene, "supports[].type", "clamp")
+    if path.startswith("rotation"):
+        put(scene, "simulation.mode", "static")
+    put(scene, "simulation.t_end", 0.02)
+    put(scene, "simulation.dt", 0.01)
+    return scene
+
+
+def examples():
+    """The example of every key and option runs."""
+    count = 0
+    for key in keys.values():
+        if not key["example"]:
+            continue
+        path, value = key["path"], yaml.safe_load(key["example"])
+        option = path.startswith("-") or path.startswith("rods[].material.") or path == "rods[].measure"
+        runs = [(exampleScene(path, value), [])] if not path.startswith("-") else []
+        if option:
+            name = path if path.startswith("-") else "-rod_" + path.rpartition(".")[2]
+            words = [] if path == "-scene" else [name, key["example"].replace("[", "").replace("]", "").replace(", ", ",")]
+            runs.append((exampleScene(path if not path.startswith("-") else "rods[].gravity", value if not path.startswith("-") else True), words))
+        for scene, words in runs:
+            with tempfile.TemporaryDirectory() as folder:
+                with open(f"{folder}/s.yaml", "w") as f:
+                    yaml.safe_dump(scene, f)
+                run = subprocess.run([program, "-scene", "s.yaml", *words], cwd=folder, capture_output=True, text=True)
+                assert run.returncode == 0, f"{path}: {key['example']}: exit code {run.returncode}\n{run.stderr}\n{yaml.safe_dump(scene)} {words}"
+                count += 1
+    assert count > 90, f"only {count} examples were run"
+
+
 def complete(*words):
     """What bash completes the last of some words to."""
     quoted = " ".join(f"'{w}'" for w in words)
@@ -47,6 +117,7 @@ def complete(*words):
 
 
 defaults()
+examples()
 assert complete("tendril", "-integ") == ["-integrator"]
 assert complete("tendril", "-integrator", "") == keys["-integrator"]["choices"].split("|")
 assert complete("tendril", "-rod_you") == ["-rod_young"]

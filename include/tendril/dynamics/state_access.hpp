@@ -14,7 +14,7 @@ public:
   /// \param rod by scene order, from 0
   /// \throws SceneError where there is no such rod
   RodAccess(Simulation &simulation, int rod);
-  /// \param name of one rod, as trajectories have it: that of the scene, with .1, .2 ... for the polylines of a file and #1, #2 ... for copies
+  /// \param name of one rod, as trajectories have it: that of the scene, with .0, .1 ... for the polylines of a file and #0, #1 ... for copies
   RodAccess(Simulation &simulation, const std::string &name);
 
   int vertices() const { return range_.vertices; }

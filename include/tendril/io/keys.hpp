@@ -43,6 +43,7 @@ struct Key {
   const char *choices = ""; ///< a|b|c
   const char *example = ""; ///< a value
   const char *group = "";   ///< of an option
+  const char *more = "";    ///< what -help leaves out and pages have
 
   constexpr bool isOption() const { return path[0] == '-'; }
   constexpr bool isRequired() const { return std::string_view(fallback) == "required"; }
@@ -161,16 +162,23 @@ inline constexpr Key keys[] = {
     {"-integrator", KeyType::word, "", "euler", "time integrator, all but euler of second order (docs/user.md says which for what)", anything,
      "euler|bdf2|sdirk2|midpoint|energy_momentum|generalized_alpha", "bdf2", "time"},
     {"-rho_inf", KeyType::number, "", "0.8", "generalized_alpha: what is left of the highest frequencies after a step", {0, 1}, "", "", "time"},
-    {"-dt_adapt", KeyType::word, "", "none", "none: steps of -dt; error: as long as the estimated error of a step allows", anything, "none|error", "error", "time"},
-    {"-dt_rtol", KeyType::number, "", "1e-3", "-dt_adapt error: error of a step, relative to what it moves", positive, "", "", "time"},
+    {"-dt_adapt", KeyType::word, "", "none", "none: steps of -dt; error: as long as the estimated error of a step allows", anything, "none|error", "error", "time",
+     "the first step is that of -dt"},
+    {"-dt_rtol", KeyType::number, "", "1e-3", "-dt_adapt error: error of a step, relative to what it moves", positive, "", "", "time",
+     "root mean square over the rod"},
     {"-dt_atol", KeyType::number, "", "1e-6", "-dt_adapt error: and in addition, relative to the length of the rod (twists in rad)", positive, "", "", "time"},
-    {"-dt_max", KeyType::number, "s", "(none)", "-dt_adapt error: largest step", positive, "", "", "time"},
+    {"-dt_max", KeyType::number, "s", "(none)", "-dt_adapt error: largest step", positive, "", "", "time",
+     "the smallest is -dt_min, which is taken whatever its error"},
     {"-dt_min", KeyType::number, "s", "(dt/1024)", "smallest step after rejections; in statics a load factor", positive, "", "1e-6", "time"},
-    {"-load_steps", KeyType::integer, "", "(of the scene)", "static: the first increment of the load factor is one over this", from_one, "", "", "time"},
-    {"-continuation", KeyType::word, "", "load", "static: steps of the load factor, or along the path of equilibria, through limit points", anything, "load|arclength", "", "time"},
-    {"-arclength_steps", KeyType::integer, "", "200", "most steps along the path", from_one, "", "", "time"},
+    {"-load_steps", KeyType::integer, "", "(of the scene)", "static: the first increment of the load factor is one over this", from_one, "", "", "time",
+     "steps grow to four times it where Newton needs at most 4 iterations, and halve where it fails"},
+    {"-continuation", KeyType::word, "", "load", "static: steps of the load factor, or along the path of equilibria, through limit points", anything, "load|arclength", "", "time",
+     "stable or not"},
+    {"-arclength_steps", KeyType::integer, "", "200", "most steps along the path", from_one, "", "", "time",
+     "the path ends before where the load factor reaches 1"},
     {"-bifurcation", KeyType::word, "", "locate", "static: where stability is lost: off, locate (find the critical load and go on), or stop there", anything,
-     "off|locate|stop", "", "time"},
+     "off|locate|stop", "", "time",
+     "all with exit code 0"},
     {"-snes_rtol", KeyType::number, "", "1e-6", "Newton's tolerance: residual over the loads of each rod", {0, 1, true}, "", "1e-8", "solver"},
     {"-snes_max_it", KeyType::integer, "", "100", "Newton iterations of a step at most", from_one, "", "50", "solver"},
     {"-rounding_tolerance", KeyType::number, "", "1e-3", "where rounding stops Newton: what is left of the answer, over what the step or its loads move, at most", fraction, "",
@@ -179,7 +187,8 @@ inline constexpr Key keys[] = {
     {"-retraction", KeyType::word, "", "length", "how positions move: straight (additive), or keeping the linearised lengths of edges (length)", anything, "additive|length",
      "additive", "solver"},
     {"-hessian", KeyType::word, "", "exact", "exact, or without second derivatives of the strains (gauss_newton), for comparison", anything, "exact|gauss_newton", "gauss_newton",
-     "solver"},
+     "solver",
+     "slower"},
     {"-error_estimate", KeyType::flag, "", "false",
      "statics: solve again with half the edge length and tell the estimated error; dynamics: tell that in time, where the integrator leaves it", anything, "", "true", "accuracy"},
     {"-accuracy", KeyType::number, "", "(edges of the scene)", "largest relative error: chooses the edges of every rod, and in dynamics the steps", fraction, "", "", "accuracy"},
@@ -187,9 +196,11 @@ inline constexpr Key keys[] = {
      "whose error: position (the largest, over the rod's length), tip (over it), or energy (elastic); in dynamics root mean square in time", anything, "position|tip|energy", "",
      "accuracy"},
     {"-output_dir", KeyType::file, "", "out", "folder for the results", anything, "", "out/run", "output"},
-    {"-output_interval", KeyType::number, "s", "0", "time between frames; steps end at its multiples; 0: every step", not_negative, "", "0.1", "output"},
+    {"-output_interval", KeyType::number, "s", "0", "time between frames; steps end at its multiples; 0: every step", not_negative, "", "0.1", "output",
+     "adapted or not; equal steps are no longer than -dt where that is no divisor"},
     {"-checkpoint_interval", KeyType::integer, "", "0", "steps between checkpoints; 0: only at the end", not_negative, "", "10", "output"},
-    {"-output_fields", KeyType::text, "", "all", "fields of a frame besides the position, with commas", anything, "", "all,curvature", "output"},
+    {"-output_fields", KeyType::text, "", "all", "fields of a frame besides the position, with commas", anything, "", "all,curvature", "output",
+     "all is director, velocity, twist_rate, axial_force and turns; what is not in the state is named, e.g. all,force,moment"},
 };
 
 constexpr const Key *findKey(std::string_view path) {

@@ -8,9 +8,10 @@
 
 namespace tendril {
 
-/// The files that a command line names by -options_file, and where options stand in them.
+/// The files that the command line and PETSC_OPTIONS name by -options_file, and where options stand in them.
 class OptionFiles {
 public:
+  /// \param argc, argv of main
   /// \throws SceneError naming file and line
   void read(int argc, char **argv);
   /// "file:line" of an option, without its dash; empty where the command line gives it, or nothing does.
