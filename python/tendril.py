@@ -78,18 +78,20 @@ def _open(path):
         raise TendrilError(f"{path}: {'there is no such file' if e.errno == 2 else e.strerror}") from None
     if head[:8] != b"\x89HDF\r\n\x1a\n":
         raise TendrilError(f"{path}: is " + ("not an HDF5 file" if head else "empty; has its run begun?"))
-    shared = head[8:] >= b"\x03"  # older kinds of HDF5 files know no reading while they grow
+    # Files that a run has open, or had when it was killed, are marked: those are read while they grow. Others are not:
+    # HDF5 reads what is damaged again and again then, in hope of a writer that mends it.
     for wait in [0.025] * 20 + [0]:
-        try:
-            return _unlocked(path, shared)
-        except (OSError, ValueError, RuntimeError) as e:
-            reason = str(e).split("\n")[0]
-            clock.sleep(wait)
+        for shared in (False, True)[: 2 if head[8:] >= b"\x03" else 1]:
+            try:
+                return _unlocked(path, shared)
+            except (OSError, ValueError, RuntimeError) as e:
+                reason = str(e).split("\n")[0]
+        clock.sleep(wait)
     raise TendrilError(f"{path}: cannot be opened; is it whole, or does a run just start? ({reason})")
 
 
 class Field:
-    """A field of all rods, at `place`: vertices, edges or cells; indices read from the file what they ask for.
+    """A field of all rods, at `place`: vertices, edges, cells or supports; indices read from the file what they ask for.
 
     field[frame], field[first:last, vertex], numpy.asarray(field). Shape: (frames, n), or (frames, n, components).
     """
@@ -176,6 +178,9 @@ class Rod:
         return self._t._dataset("reference/" + name)[self._slices["edges" if name == "director" else "vertices"]]
 
     def _slice(self, place):
+        if place == "supports":
+            raise TendrilError("a field of supports is not one of rods: trajectory.field(name)[frame] has a row for each "
+                               "of trajectory.supports")
         if place not in self._slices:
             raise TendrilError(f"files of format 1 do not tell which {place} are those of rod '{self.name}'")
         return self._slices[place]
@@ -395,7 +400,7 @@ class Trajectory:
         for name, data in self._file["state"].items():
             place, unit = FORMAT_1_FIELDS.get(name, (None, None)) if self.format_version == 1 else (
                 _text(data.attrs.get(key)) for key in ("place", "unit"))
-            if place in PLACES:
+            if place in (*PLACES, "supports"):
                 self._fields[name] = place, unit
 
     # Made when asked for: without circular references a file is closed as soon as its Trajectory is let go.
@@ -496,7 +501,7 @@ class Trajectory:
             import xarray
         except ImportError:
             raise TendrilError("to_xarray needs xarray: apt-get install python3-xarray") from None
-        dimension = {"vertices": "vertex", "edges": "edge", "cells": "cell"}
+        dimension = {"vertices": "vertex", "edges": "edge", "cells": "cell", "supports": "support"}
         variables = {}
         for name in self._fields:
             field = self.field(name)

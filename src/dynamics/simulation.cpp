@@ -5,6 +5,7 @@ namespace tendril {
 PetscErrorCode Simulation::setUp(Scene scene_to_run, const LoopSettings &settings) {
   PetscFunctionBeginUser;
   scene = std::move(scene_to_run);
+  dynamic = settings.dynamic;
   PetscCall(dofs.setUp(scene));
   elements = std::make_unique<Elements>(scene, dofs);
   potential = std::make_unique<IncrementalPotential>(scene, dofs, *elements, settings.dynamic);

@@ -9,11 +9,17 @@ namespace tendril {
 namespace {
 
 int rodNamed(const Scene &scene, const std::string &name) {
+  if (scene.rods.empty()) return 0; // refused later
   for (std::size_t r = 0; r < scene.rods.size(); ++r)
     if (scene.rods[r].name == name) return int(r);
   std::string names;
   for (std::size_t r = 0; r < std::min<std::size_t>(scene.rods.size(), 8); ++r) names += (r > 0 ? ", '" : "'") + scene.rods[r].name + "'";
   throw SceneError("no rod is called '" + name + "'; there are " + names + (scene.rods.size() > 8 ? " ..." : ""));
+}
+
+const Elements &elementsOf(const Simulation &simulation) {
+  if (!simulation.elements) throw SceneError("the simulation has no rods yet: set it up first");
+  return *simulation.elements;
 }
 
 int rodInRange(const Scene &scene, int rod) {
@@ -41,8 +47,8 @@ template <class... Parts> std::string text(Parts &&...parts) {
 } // namespace
 
 RodAccess::RodAccess(Simulation &simulation, int rod)
-    : scene_(simulation.scene), elements_(*simulation.elements), state_(simulation.state), index_(rodInRange(scene_, rod)), range_(elements_.rods[index_]),
-      cells_(cellsOf(elements_, index_)) {
+    : scene_(simulation.scene), elements_(elementsOf(simulation)), state_(simulation.state), dynamic_(simulation.dynamic), index_(rodInRange(scene_, rod)),
+      range_(elements_.rods[index_]), cells_(cellsOf(elements_, index_)) {
   for (const Support &support : scene_.supports)
     if (support.rod == index_) supports_.push_back(&support);
 }
@@ -116,6 +122,8 @@ void RodAccess::setTurns(State &next, std::vector<double> twists, const std::vec
     const double expected = twists[n] + turning(cell.frame1) - turning(cell.frame0);
     const double principal = halfAngleBetween(frameAt(next, cell.frame0), frameAt(next, cell.frame1)).angle();
     if (!std::isfinite(principal)) fail(text("folds back on itself at vertex ", vertexOf(cell), "; edges may turn by less than 179 degrees"));
+    if (rod().measure == Measure::tan && std::abs(principal) > 0.9999 * pi)
+      fail(text("is twisted by half a turn at vertex ", vertexOf(cell), ", the barrier of measure tan; use less, or measure: angle"));
     turns[n] = 2 * pi * std::round((expected - principal) / (2 * pi));
   }
   if (rod().measure == Measure::angle) std::copy(turns.begin(), turns.end(), next.turns.begin() + elements_.rod_cells[index_]);
@@ -125,6 +133,7 @@ void RodAccess::accept(State &&next) {
   next.memory.clear();
   next.strains.clear();
   next.last_dt = 0;
+  if (!dynamic_) next.time = 0;
   state_ = std::move(next);
 }
 
@@ -226,6 +235,7 @@ void RodAccess::setVelocities(const std::vector<Vec3> &v) {
 
 void RodAccess::setTwistRates(const std::vector<double> &rate) {
   checkCount(rate.size(), range_.edges, "twist rates");
+  if (!range_.twist) fail("is a cable, whose twist means nothing");
   if (const int i = firstNotFinite(rate); i >= 0) fail(text("the twist rate of edge ", i, " is not finite"));
   if (rate == twistRates()) return;
   State next = state_;
@@ -235,7 +245,7 @@ void RodAccess::setTwistRates(const std::vector<double> &rate) {
 
 void RodAccess::stop() {
   setVelocities(std::vector<Vec3>(range_.vertices, Vec3::Zero()));
-  setTwistRates(std::vector<double>(range_.edges, 0.0));
+  if (range_.twist) setTwistRates(std::vector<double>(range_.edges, 0.0));
 }
 
 void RodAccess::reset() {

@@ -144,7 +144,6 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
   double &dt = control.dt;
   int &good = control.good;
   bool &stable = control.stable;
-  if (settings_.dynamic && state.memory.empty()) PetscCall(integrator_->begin(solver_, dt, state));
   int rejected = 0, in_vain = 0; // steps since the last one accepted, and their iterations
   PetscLogDouble begin, now;
   PetscCall(PetscTime(&begin));
@@ -154,6 +153,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
   State next = state; // what the blocks that have converged come to; the state itself stays as it is until all have
   EnergyBudget energy;
   while (state.time < settings_.t_end) {
+    if (settings_.dynamic && state.memory.empty()) PetscCall(integrator_->begin(solver_, dt, state)); // at the start, and where the state was written
     double landing;
     const double h = nextStep(state.time, &landing);
     Step step = stepOf(settings_, state, h);

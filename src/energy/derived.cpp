@@ -62,7 +62,8 @@ RodStrains rodStrains(const Scene &scene, const Elements &elements, const State 
 
 RodActions rodActions(const Scene &scene, const Elements &elements, const State &state, double motion_time, double load_factor) {
   const Configuration c = configurationOf(state, scene, elements, motion_time);
-  RodActions out{std::vector<Vec3>(state.director.size()), std::vector<Vec3>(state.position.size(), Vec3::Zero())};
+  RodActions out{std::vector<Vec3>(state.director.size()), std::vector<Vec3>(state.position.size(), Vec3::Zero()),
+                 std::vector<Vec3>(scene.supports.size(), Vec3::Zero())};
   for (std::size_t r = 0; r < elements.rods.size(); ++r) {
     const RodRange &rod = elements.rods[r];
     for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
@@ -91,6 +92,22 @@ RodActions rodActions(const Scene &scene, const Elements &elements, const State 
     else if (place.at_end)
       out.moment[place.vertex] -= f[0].length * f[0].tangent.cross(by_edge0) + d[3] * f[0].tangent;
   });
+  for (std::size_t k = 0; k < scene.supports.size(); ++k) {
+    const Support &support = scene.supports[k];
+    if (!support.holdsPosition()) continue;
+    const Rod &rod = scene.rods[support.rod];
+    const RodRange &range = elements.rods[support.rod];
+    const int v = range.first_vertex + support.vertex, before = rod.edgeBefore(support.vertex), after = rod.edgeAfter(support.vertex);
+    const double mass = elements.mass()[elements.vertex_slot[v]];
+    Vec3 loads = scene.rotation.matrix() * (state.position[v] - scene.rotation.centre) * mass;
+    if (rod.gravity) loads += mass * scene.gravity;
+    for (const NodalForce &f : scene.forces)
+      if (f.rod == support.rod && f.vertex == support.vertex) loads += f.force;
+    Vec3 &reaction = out.reaction[k];
+    reaction = mass * rod.material.mass_damping_coefficient * state.velocity[v] - load_factor * loads;
+    if (before >= 0) reaction += out.force[range.first_edge + before];
+    if (after >= 0) reaction -= out.force[range.first_edge + after];
+  }
   return out;
 }
 

@@ -57,7 +57,7 @@ void addOption(std::ostringstream &out, const std::string &name, const Key &key)
   if (!choices.empty())
     head += " " + choices;
   else if (key.type != KeyType::flag)
-    head += key.type == KeyType::vector ? " x,y,z" : key.type == KeyType::file ? " PATH" : key.type == KeyType::text ? " TEXT" : " N";
+    head += key.type == KeyType::vector ? " x,y,z" : key.type == KeyType::file ? " PATH" : key.type == KeyType::text ? " TEXT" : key.type == KeyType::pair ? " N[,N]" : " N";
   std::string tail = key.meaning;
   if (*key.unit) tail += std::string(" [") + key.unit + "]";
   if (key.isOption() && !key.isRequired()) tail += key.hasFallback() ? std::string(" (default ") + key.fallback + ")" : std::string(" ") + key.fallback;

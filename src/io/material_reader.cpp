@@ -8,6 +8,7 @@ class MaterialReader {
 public:
   MaterialReader(YamlMap &map, const Overrides &overrides) : map_(map), overrides_(overrides) {}
 
+  bool isOverridden(AnyKey key) const { return overrides_.count(std::string(key->name())) > 0; }
   bool has(const Key &key) { return map_.has(key) || overrides_.count(std::string(key.name())) > 0; }
   bool has(AnyKey key) { return has(*key); }
   double number(KeyOf<KeyType::number> key) { return value(*key).number(*key); }
@@ -34,8 +35,13 @@ private:
 
 Material readSection(MaterialReader &in) {
   Section section{};
-  const bool circle = in.has("rods[].material.radius"), ellipse = in.has("rods[].material.radii");
-  if (int(circle) + int(ellipse) + int(in.has("rods[].material.width") || in.has("rods[].material.height")) != 1)
+  // A section by options takes the place of another one in the file.
+  const bool by_radius = in.isOverridden("rods[].material.radius"), by_radii = in.isOverridden("rods[].material.radii"),
+             by_sides = in.isOverridden("rods[].material.width") || in.isOverridden("rods[].material.height");
+  const bool any = by_radius || by_radii || by_sides;
+  const bool circle = in.has("rods[].material.radius") && (!any || by_radius), ellipse = in.has("rods[].material.radii") && (!any || by_radii),
+             rectangle = (in.has("rods[].material.width") || in.has("rods[].material.height")) && (!any || by_sides);
+  if (int(circle) + int(ellipse) + int(rectangle) != 1)
     in.block().fail("a homogeneous section needs one of 'radius', 'radii: [along the first director, along the second]', or 'width' and 'height'");
   if (circle)
     section = {SectionShape::circle, {in.number("rods[].material.radius"), 0}};
@@ -56,8 +62,9 @@ Material readMaterial(YamlMap &map, const Overrides &overrides) {
   MaterialReader in(map, overrides);
   Material m;
   bool section = false;
-  for (const AnyKey key : {AnyKey("rods[].material.radius"), AnyKey("rods[].material.radii"), AnyKey("rods[].material.width"), AnyKey("rods[].material.height"),
-                           AnyKey("rods[].material.young"), AnyKey("rods[].material.poisson"), AnyKey("rods[].material.shear"), AnyKey("rods[].material.density")})
+  for (const AnyKey key :
+       {AnyKey("rods[].material.radius"), AnyKey("rods[].material.radii"), AnyKey("rods[].material.width"), AnyKey("rods[].material.height"),
+        AnyKey("rods[].material.young"), AnyKey("rods[].material.poisson"), AnyKey("rods[].material.shear"), AnyKey("rods[].material.density")})
     section = in.has(key) || section;
   if (section) m = readSection(in);
   // The stiffness parameters; beside a section they replace what follows from it.

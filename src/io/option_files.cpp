@@ -13,9 +13,7 @@ namespace {
 
 bool isYaml(const std::string &file) { return file.ends_with(".yaml") || file.ends_with(".yml"); }
 
-bool isOption(const std::string &word) {
-  return word.size() > 1 && word[0] == '-' && (std::isalpha(static_cast<unsigned char>(word[1])) || word[1] == '-');
-}
+bool isOption(const std::string &word) { return word.size() > 1 && word[0] == '-' && (std::isalpha(static_cast<unsigned char>(word[1])) || word[1] == '-'); }
 
 using Places = std::map<std::string, int>; // line of each option
 
@@ -26,24 +24,19 @@ void collect(const YamlValue &value, const std::string &prefix, Places &places) 
     const YAML::Node key_node = entry.first, node = entry.second;
     const YamlValue key(key_node, value.file(), "options");
     const std::string word = key.text();
-    if (word.empty() || !std::isalpha(static_cast<unsigned char>(word[0])))
-      key.fail("'" + word + "' is no name of an option; write names without their dash");
+    if (word.empty() || !std::isalpha(static_cast<unsigned char>(word[0]))) key.fail("'" + word + "' is no name of an option; write names without their dash");
     const std::string name = prefix + word;
     if (node.IsMap()) {
       collect(YamlValue(node, value.file(), name), name + "_", places);
       continue;
     }
-    if (name.rfind("options_file", 0) == 0)
-      key.fail("a file of options names no other; give each with its own -options_file");
+    if (name.rfind("options_file", 0) == 0) key.fail("a file of options names no other; give each with its own -options_file");
     if (node.IsSequence())
       for (const YAML::Node &item : node)
-        if (!item.IsScalar())
-          key.fail("'" + name + "' is a list of more than values, which no option takes (a scene is given by -scene)");
+        if (!item.IsScalar()) key.fail("'" + name + "' is a list of more than values, which no option takes (a scene is given by -scene)");
     const int line = key_node.Mark().line + 1;
     const auto [first, fresh] = places.emplace(name, line);
-    if (!fresh)
-      key.fail("the option '" + name + "' stands here a second time (first in line " + std::to_string(first->second) +
-               "); keep one of the two");
+    if (!fresh) key.fail("the option '" + name + "' stands here a second time (first in line " + std::to_string(first->second) + "); keep one of the two");
   }
 }
 
@@ -56,12 +49,12 @@ void OptionFiles::readYaml(const std::string &file) {
   } catch (const YAML::Exception &e) {
     throw SceneError(file + ":" + std::to_string(e.mark.line + 1) + ": not valid YAML: " + e.msg);
   }
+  Places places;
   for (const YAML::Node &document : documents) {
     if (document.IsNull()) continue;
-    Places places;
     collect(YamlValue(document, file, "options"), "", places);
-    for (const auto &[name, line] : places) places_[name] = file + ":" + std::to_string(line);
   }
+  for (const auto &[name, line] : places) places_[name] = file + ":" + std::to_string(line);
 }
 
 /// PETSc's older format: an option and its value a line.
@@ -74,9 +67,10 @@ void OptionFiles::readPlain(const std::string &file) {
     std::string word;
     if (!(words >> word) || std::string("#%!").find(word[0]) != std::string::npos) continue;
     const std::string place = file + ":" + std::to_string(number);
-    if (!isOption(word))
-      throw SceneError(place + ": '" + word +
-                       "' is no option; options begin with -, and files in YAML are named *.yaml");
+    if (!isOption(word)) throw SceneError(place + ": '" + word + "' is no option; options begin with -, and files in YAML are named *.yaml");
+    std::string value, rest;
+    if (words >> value >> rest && value[0] != '"' && rest[0] != '#')
+      throw SceneError(place + ": '" + rest + "' is too much; write an option and its value a line");
     places_[word.substr(1)] = place;
   }
 }
@@ -100,8 +94,7 @@ void OptionFiles::read(int argc, char **argv) {
     if (file.find('$') != std::string::npos) continue; // a variable, which PETSc replaces
     const std::string named = "option " + option + ": '" + file;
     if (std::filesystem::is_directory(file)) throw SceneError(named + "' is a folder; give a file");
-    if (!std::ifstream(file))
-      throw SceneError(named + "' cannot be opened; its path begins in the folder where tendril is started");
+    if (!std::ifstream(file)) throw SceneError(named + "' cannot be opened; its path begins in the folder where tendril is started");
     files_.push_back(file);
     if (option == "-options_file_yaml" || isYaml(file))
       readYaml(file);

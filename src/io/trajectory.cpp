@@ -13,8 +13,8 @@
 namespace tendril {
 namespace {
 
-enum class On { vertices, edges, cells };
-constexpr const char *places[] = {"vertices", "edges", "cells"};
+enum class On { vertices, edges, cells, supports };
+constexpr const char *places[] = {"vertices", "edges", "cells", "supports"};
 
 /// A frame about to be written: a state and what is derived from it, as far as some field needs it.
 struct Snapshot {
@@ -46,6 +46,7 @@ const Field fields[] = {
     {"strain_energy_density", "J/m", On::vertices, 1, From::strains, [](const Snapshot &s) { return s.strains.strain_energy_density.data(); }},
     {"force", "N", On::edges, 3, From::actions, [](const Snapshot &s) { return s.actions.force[0].data(); }},
     {"moment", "N m", On::vertices, 3, From::actions, [](const Snapshot &s) { return s.actions.moment[0].data(); }},
+    {"reaction", "N", On::supports, 3, From::actions, [](const Snapshot &s) { return s.actions.reaction[0].data(); }},
 };
 
 std::vector<std::string> namesOf(bool derived) {
@@ -58,7 +59,7 @@ std::vector<std::string> namesOf(bool derived) {
 constexpr auto patience = std::chrono::milliseconds(500); ///< how long rows and frames may wait
 constexpr std::size_t most_waiting = 4 << 20;             ///< [bytes]
 
-std::array<int, 3> sizes(const Elements &e) { return {e.vertices(), e.edges(), int(e.cell_slot.size())}; }
+std::array<int, 4> sizes(const Elements &e) { return {e.vertices(), e.edges(), int(e.cell_slot.size()), int(e.support_slot.size())}; }
 
 const char *nameOf(SectionShape shape) {
   switch (shape) {
@@ -163,7 +164,7 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
     if (std::string(f.name) != "position" && !wanted.count(f.name)) continue;
     if (f.place == On::cells && std::find(elements.measure.begin(), elements.measure.end(), Measure::angle) == elements.measure.end()) continue;
     std::vector<hsize_t> slab{hsize_t(sizes(elements)[std::size_t(f.place)])};
-    if (slab[0] == 0) continue; // cables have no cells
+    if (slab[0] == 0) continue; // cables have no cells, free rods no supports
     if (f.components > 1) slab.push_back(f.components);
     state_.back() = std::make_unique<Hdf5Series>(file_, std::string("state/") + f.name, slab);
     file_.writeAttribute(std::string("state/") + f.name, "unit", std::string(f.unit));
@@ -407,7 +408,7 @@ std::string TrajectoryWriter::xdmfFrame(bool edges) const {
   out << "    </Attribute>\n";
   for (std::size_t k = 1; k < state_.size(); ++k) {
     const Field &f = fields[k];
-    if (!state_[k] || f.place == On::cells || (f.place == On::edges && !edges)) continue;
+    if (!state_[k] || f.place == On::cells || f.place == On::supports || (f.place == On::edges && !edges)) continue;
     if (f.components != 2)
       attribute(f);
     else

@@ -126,7 +126,8 @@ TEST(InternalMoment, OfASaggingRodIsThatOfTheWeightBeyond) {
   const RodActions actions = actionsOf(sim);
   for (int v = 0; v <= edges; ++v) {
     Vec3 expected = Vec3::Zero();
-    for (int w = v; w <= edges; ++w) expected += sim.elements->mass()[sim.elements->vertex_slot[w]] * (sim.state.position[w] - sim.state.position[v]).cross(scene.gravity);
+    for (int w = v; w <= edges; ++w)
+      expected += sim.elements->mass()[sim.elements->vertex_slot[w]] * (sim.state.position[w] - sim.state.position[v]).cross(scene.gravity);
     EXPECT_LT((actions.moment[v] - expected).norm(), 10 * exact) << v; // loads of 8
   }
 }
@@ -207,6 +208,50 @@ TEST(InternalForce, AcceleratesTheVertices) {
     const Vec3 rate = sim.elements->mass()[sim.elements->vertex_slot[v]] * ((sim.state.velocity[v] - before[v]) / dt - scene.gravity);
     EXPECT_LT((beyond - actions.force[v - 1] - rate).norm(), 1e-7) << v; // differences of positions over dt^2
   }
+}
+
+/// All supports together hold the weight and the loads, those on held vertices too; `fix_twist` holds nothing.
+TEST(Reaction, OfAllSupportsIsTheLoad) {
+  Scene scene = clampedScene(softRod(12, Measure::angle));
+  scene.supports.push_back(hold(scene, 0, 5, Support::Kind::fix_twist));
+  scene.supports.push_back(hold(scene, 0, 8, Support::Kind::pin));
+  scene.forces = {{0, 12, Vec3(0, -1, 0.5)}, {0, 8, Vec3(0, 0, 2)}, {0, 3, Vec3(0, 0.5, 0)}};
+  scene.gravity = Vec3(0, -3, 0);
+  Simulation sim;
+  solve(sim, scene);
+  const std::vector<Vec3> reaction = actionsOf(sim).reaction;
+  ASSERT_EQ(reaction.size(), 3u);
+  EXPECT_EQ(reaction[1], Vec3(Vec3::Zero()));
+  EXPECT_LT((reaction[0] + reaction[2] + Vec3(0, -3 - 0.5, 2.5)).norm(), 10 * exact);
+}
+
+/// In motion: the change of momentum of all vertices, dissipation by mass included, over one step of backward Euler.
+TEST(Reaction, OfAMovingPinPullsTheRodAlong) {
+  const double dt = 0.01;
+  Rod rod = softRod(12, Measure::tan);
+  rod.material.linear_rotational_inertia = 1e-12;
+  rod.material.mass_damping_coefficient = 0.7;
+  Scene scene = clampedScene(rod);
+  scene.supports[0].kind = Support::Kind::pin;
+  scene.supports[0].motion.velocity = Vec3(-0.2, 0.3, 0.1);
+  scene.gravity = Vec3(0, -9.81, 2);
+  EXPECT_PETSC(PetscOptionsSetValue(nullptr, "-snes_rtol", "1e-10"));
+  Simulation sim;
+  runTo(sim, scene, dynamics(dt, 10 * dt));
+  auto momentum = [&] {
+    Vec3 sum = Vec3::Zero();
+    for (int v = 0; v <= 12; ++v) sum += sim.elements->mass()[sim.elements->vertex_slot[v]] * sim.state.velocity[v];
+    return sum;
+  };
+  const Vec3 before = momentum();
+  TimeLoop loop(sim.solver, dynamics(dt, 11 * dt));
+  bool finished;
+  EXPECT_PETSC(loop.run(
+      sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+  EXPECT_PETSC(PetscOptionsClearValue(nullptr, "-snes_rtol"));
+  ASSERT_TRUE(finished);
+  const Vec3 expected = (momentum() - before) / dt + 0.7 * momentum() - scene.gravity * rod.material.linear_density;
+  EXPECT_LT((actionsOf(sim).reaction[0] - expected).norm(), 1e-6) << expected.norm(); // differences of positions over dt^2, of 13 vertices
 }
 
 TEST(Strains, OfARingAreItsCurvature) {

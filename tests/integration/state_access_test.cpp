@@ -176,6 +176,35 @@ TEST(StateAccess, ReversedVelocitiesGoBackToTheStart) {
   for (int v = 0; v < 25; ++v) EXPECT_LT((rod.positions()[v] - start.position[4 + v]).norm(), 1e-6) << v; // moved by up to centimetres, 100 steps of 1e-6
 }
 
+/// Also from within the loop: every integrator begins anew, so that the rods go on as from a state of the same content.
+TEST(StateAccess, IsAllowedAfterEachStep) {
+  for (const char *name : {"euler", "bdf2", "sdirk2", "midpoint", "energy_momentum", "generalized_alpha"}) {
+    LoopSettings settings = dynamics(5e-3, 0.1);
+    settings.integrator.name = name;
+    Simulation inside, between;
+    for (Simulation *sim : {&inside, &between}) EXPECT_PETSC(sim->setUp(springScene(true), settings));
+    TimeLoop loop(inside.solver, settings);
+    bool finished = false;
+    auto stopHalfway = [&](const State &state, const Diagnostics &) {
+      if (state.step == 10) RodAccess(inside, "spring").stop();
+      return PetscErrorCode(0);
+    };
+    EXPECT_PETSC(loop.run(inside.state, stopHalfway, &finished));
+    EXPECT_TRUE(finished) << name << ": " << loop.failure();
+    advance(between, settings, 0.05);
+    RodAccess(between, "spring").stop();
+    advance(between, settings, 0.1);
+    for (int v = 0; v < 29; ++v)
+      EXPECT_LT((inside.state.position[v] - between.state.position[v]).norm(), 1e-12) << name << " " << v; // the steps differ by rounding
+  }
+}
+
+TEST(StateAccess, NeedsASimulationThatIsSetUp) {
+  Simulation sim;
+  EXPECT_EQ(mistakeOf([&] { RodAccess(sim, 0); }), "the simulation has no rods yet: set it up first");
+  EXPECT_EQ(mistakeOf([&] { RodAccess(sim, "a"); }), "the simulation has no rods yet: set it up first");
+}
+
 /// A written state is only where a static search begins: the equilibrium is the same.
 TEST(StateAccess, StaticsComeBackToTheirEquilibrium) {
   Scene scene = clampedScene(straightRod(10));
@@ -187,7 +216,7 @@ TEST(StateAccess, StaticsComeBackToTheirEquilibrium) {
   std::vector<Vec3> x = answer;
   for (int v = 2; v <= 10; ++v) x[v][1] += 0.01 * v;
   rod.setPositions(x);
-  sim.state.time = 0.5; // half the load is on
+  EXPECT_EQ(sim.state.time, 0); // what was written is no equilibrium
   advance(sim, statics(2), 1);
   for (int v = 0; v <= 10; ++v) EXPECT_LT((sim.state.position[v] - answer[v]).norm(), 1e-7) << v; // -snes_rtol 1e-6 of a deflection of 0.3
 }
@@ -235,6 +264,7 @@ TEST(StateAccess, MistakesAreRefusedWhole) {
       {"rod 'spring': folds back on itself at vertex 4", [&] { rod.setPositions(with(x, 5, Vec3(0.5 * (x[3] + x[4])))); }},
       {"rod 'spring': the director of edge 2 is (", [&] { rod.setDirectors(with(d, 2, Vec3(2 * d[2]))); }},
       {"rod 'spring': the director of edge 2 is (", [&] { rod.setDirectors(with(d, 2, Vec3((x[3] - x[2]).normalized()))); }},
+      {"rod 'spring': is twisted by half a turn at vertex 2, the barrier", [&] { rod.setDirectors(with(d, 2, Vec3(-d[2]))); }},
       {"measure tan takes less than half a turn", [&] { rod.setTwists(with(rod.twists(), 2, 3.2)); }},
       {"the twist angle at vertex 2 is not finite", [&] { rod.setTwists(with(rod.twists(), 2, HUGE_VAL)); }},
       {"rod 'spring': the velocity of vertex 1 is not finite", [&] { rod.setVelocities(with(x, 1, Vec3(NAN, 0, 0))); }},

@@ -14,6 +14,7 @@ public:
   std::unique_ptr<IncrementalPotential> potential;
   StepSolver solver;
   State state;
+  bool dynamic = true;
 
   Simulation() = default;
   Simulation(const Simulation &) = delete; // parts refer to each other

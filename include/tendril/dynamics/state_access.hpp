@@ -8,11 +8,12 @@
 namespace tendril {
 
 /// The state of one rod of a simulation. What is written is checked first: a SceneError names the rod and what is wrong, and nothing has changed then.
-/// Writing what was read changes nothing, to the bit. Any other write makes the integrator begin anew: what it remembers is of another motion.
+/// Writing what was read changes nothing, to the bit. Any other write makes the run begin anew from there: in dynamics the integrator, since what it
+/// remembers is of another motion; in statics the load factor, state.time, which becomes 0, since what was written is no equilibrium.
 class RodAccess {
 public:
   /// \param rod by scene order, from 0
-  /// \throws SceneError where there is no such rod
+  /// \throws SceneError where there is no such rod, or the simulation is not set up
   RodAccess(Simulation &simulation, int rod);
   /// \param name of one rod, as trajectories have it: that of the scene, with .0, .1 ... for the polylines of a file and #0, #1 ... for copies
   RodAccess(Simulation &simulation, const std::string &name);
@@ -34,7 +35,7 @@ public:
   /// \param x (nv) [m]; held vertices stay where they are, edges have a length and do not fold back
   void setPositions(const std::vector<Vec3> &x);
   /// Turns each first director about its edge, by less than half a turn, to where it is given.
-  /// \param d (ne) of unit length and normal to their edges within 1e-3; made so exactly
+  /// \param d (ne) of unit length and normal to their edges within 1e-3; made so exactly. Measure `tan` takes twists below half a turn
   void setDirectors(const std::vector<Vec3> &d);
   /// Turns the directors so that the twist angles become these. Edge 0 stays where the twist of vertex 0 is free.
   /// \param angle (nv) [rad]; of measure `tan` below half a turn. Angles of free ends mean nothing. Where both ends are held, the last follows from the
@@ -46,13 +47,14 @@ public:
   void setTwistRates(const std::vector<double> &rate);
   /// Velocities and twist rates to zero.
   void stop();
-  /// The rod as at the start of the run, held vertices included: the next step takes those to where their supports are by then.
+  /// The rod as at the start of the run. Held vertices are where they were then, too: with supports that move, set state.time back as well.
   void reset();
 
 private:
   const Scene &scene_;
   const Elements &elements_;
   State &state_;
+  bool dynamic_;
   int index_;
   const RodRange &range_;
   std::vector<LooseCell> cells_;          ///< in scene order

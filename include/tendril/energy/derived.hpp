@@ -20,10 +20,13 @@ RodStrains rodStrains(const Scene &scene, const Elements &elements, const State 
 struct RodActions {
   std::vector<Vec3> force;  ///< (ne) [N]; tension points along the tangent
   std::vector<Vec3> moment; ///< (nv) about the vertex [N m]; zero at free and pinned ends; beside a support inside a rod, on the side of higher numbers
+  /// (ns) What each support does to its rod; zero where it holds no position [N]. With the weight and the loads on its vertex and dissipation by mass;
+  /// prescribed motions have no acceleration but at their kinks.
+  std::vector<Vec3> reaction;
 };
 /// With forces F and couples C, at an equilibrium and whatever the edge length: force(i) = force(i+1) + F(i+1) and
 /// moment(i) = moment(i+1) + e(i) x force(i) + C(i).
-/// \param load_factor on the couples of the scene
+/// \param load_factor on the loads of the scene
 RodActions rodActions(const Scene &scene, const Elements &elements, const State &state, double motion_time, double load_factor);
 
 } // namespace tendril
