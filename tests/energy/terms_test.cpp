@@ -32,7 +32,9 @@ std::vector<Case> cases() {
   auto add = [&](const std::string &name, bool dynamic, auto change, Measure measure = Measure::angle) {
     Scene scene = clampedScene(softRod(measure));
     change(scene);
-    all.push_back({name, dynamic, std::move(scene)});
+    all.push_back({name, dynamic, scene});
+    for (Rod &rod : scene.rods) rod.energy = Energy::classical;
+    all.push_back({name + ", classical", dynamic, std::move(scene)});
   };
   const Vec3 tip(2, -3, 1);
   auto pull = [&](Scene &s) { s.forces = {{0, 10, tip}}; };
