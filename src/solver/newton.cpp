@@ -537,35 +537,34 @@ std::string NewtonSolver::nearBarrier() const {
   return hint;
 }
 
-/// A hint for failures where a rod of the energy `seed` bends about as sharply as it can: without axial force its stretch r obeys r^2 = 1 - 2 B kappa^2/EA, with
-/// kappa the turning per reference length, and the moment B r^2 kappa is largest where B kappa^2 = EA/6. Looked for where the step began and where it ended.
+/// A hint for failures of steps at whose start a rod of the energy `seed` bends about as sharply as it can: without axial force its stretch r obeys
+/// r^2 = 1 - 2 B kappa^2/EA, with kappa the turning per reference length, and the moment B r^2 kappa is largest where B kappa^2 = EA/6.
 std::string NewtonSolver::nearMomentLimit() const {
   const Elements &e = potential_->elements();
-  const Scene &scene = potential_->scene();
+  const Configuration &c = potential_->start();
   double sharpest = 0.5; // of 6 B kappa^2/EA: moments above 0.88 of the limit
   std::ostringstream hint;
-  for (const Configuration *c : {&potential_->start(), &potential_->iterate()})
-    for (int r = rods_.begin; r < rods_.end; ++r) {
-      if (scene.rods[r].energy != Energy::seed) continue;
-      const double axial = scene.rods[r].material.axial_stiffness;
-      forCells(e, r, [&]<class T>(const LooseCell &cells, int count) {
-        for (int l = 0; l < count; ++l) {
-          const LooseCell cell{cells.slot + l, cells.frame0 + l, cells.frame1 + l, cells.vertex + l};
-          const CellOf<double> k = cellOf<double>(e.cells(), *c, cell.slot);
-          const std::array<double, 3> s = presentStrain<double>(e, *c, r, cell);
-          const double factor = k.base + k.weight[0] * c->frameAt(cell.frame0).length + k.weight[1] * c->frameAt(cell.frame1).length;
-          const double m1 = k.stiffness[0] * (s[0] - k.rest[0]), m2 = k.stiffness[1] * (s[1] - k.rest[1]), moment = std::hypot(m1, m2);
-          const double stored = (m1 * (s[0] - k.rest[0]) + m2 * (s[1] - k.rest[1])) / e.cellLength()[cell.slot], bending = moment * moment / stored; // B
-          const double sharpness = 6 * stored / (factor * factor * axial);
-          if (!(sharpness > sharpest)) continue;
-          sharpest = sharpness;
-          hint.str("");
-          hint << std::setprecision(4) << "; rod '" << scene.rods[r].name << "' bends under a moment of " << factor * moment
-               << " N m, and the energy 'seed', which couples stretch and bending, bears at most " << 2.0 / 3 * std::sqrt(axial * bending / 6)
-               << " = (2/3) sqrt(EA EI/6) without tension: 'energy: classical' has no such limit";
-        }
-      });
-    }
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    const Rod &rod = potential_->scene().rods[r];
+    if (rod.energy != Energy::seed) continue;
+    forCells(e, r, [&]<class T>(const LooseCell &cells, int count) {
+      for (int l = 0; l < count; ++l) {
+        const LooseCell cell{cells.slot + l, cells.frame0 + l, cells.frame1 + l, cells.vertex + l};
+        const CellOf<double> k = cellOf<double>(e.cells(), c, cell.slot);
+        const double stretch = cellGeometry(c.frameAt(cell.frame0), c.frameAt(cell.frame1), k).stretch;
+        const std::array<double, 3> s = presentStrain<double>(e, c, r, cell);
+        const Eigen::Vector2d strain(s[0] - k.rest[0], s[1] - k.rest[1]), force(k.stiffness[0] * strain[0], k.stiffness[1] * strain[1]);
+        const double bending = force.squaredNorm() / force.dot(strain) * e.cellLength()[cell.slot]; // B about the axis of bending
+        const double sharpness = 6 * force.squaredNorm() / (bending * stretch * stretch * rod.material.axial_stiffness);
+        if (!(sharpness > sharpest)) continue;
+        sharpest = sharpness;
+        hint.str("");
+        hint << std::setprecision(4) << "; rod '" << rod.name << "' bends under a moment of " << stretch * force.norm()
+             << " N m, and its 'energy: seed', which couples bending with stretch, bears at most (2/3) sqrt(EA EI/6) = "
+             << 2.0 / 3 * std::sqrt(rod.material.axial_stiffness * bending / 6) << " N m without tension; 'energy: classical' has no limit";
+      }
+    });
+  }
   return hint.str();
 }
 

@@ -63,7 +63,7 @@ TEST(EndMoment, ShortensARodOfTheSeed) {
   const double stretch = std::sqrt(1 - 2 * kappa * kappa / axial);
   const Solved s(coupleScene(Energy::seed, edges, axial, moment));
   ASSERT_TRUE(s.finished) << s.failure;
-  for (int v = 1; v + 1 < edges; ++v) { // the last edge has no cell behind it
+  for (int v = 1; v <= edges / 2; ++v) { // the last edge has no cell behind it; what that changes falls by 20 from edge to edge
     EXPECT_NEAR(s.edge(v - 1).norm() * edges, stretch, exact) << v;
     EXPECT_NEAR(s.turning(v) * edges, kappa, exact * kappa) << v;
   }
@@ -82,7 +82,7 @@ TEST(EndMoment, HasALimitUnderTheSeedAlone) {
   EXPECT_FALSE(over.finished);
   EXPECT_NEAR(over.sim.state.time * 9, limit, 0.01 * limit); // load steps down to 1e-4; the last edge, half as bent, shortens less
   EXPECT_NE(over.failure.find("rod 'rod' bends under a moment of 8."), std::string::npos) << over.failure;
-  EXPECT_NE(over.failure.find("bears at most 8.607"), std::string::npos) << over.failure;
+  EXPECT_NE(over.failure.find("= 8.607 N m"), std::string::npos) << over.failure;
   EXPECT_NE(over.failure.find("energy: classical"), std::string::npos) << over.failure;
   const Solved classical(coupleScene(Energy::classical, 20, 1e3, 18), 10);
   ASSERT_TRUE(classical.finished) << classical.failure;
