@@ -559,8 +559,8 @@ std::string NewtonSolver::nearMomentLimit() const {
         if (!(sharpness > sharpest)) continue;
         sharpest = sharpness;
         hint.str("");
-        hint << std::setprecision(4) << "; rod '" << rod.name << "' bends under a moment of " << stretch * force.norm()
-             << " N m, and its 'energy: seed', which couples bending with stretch, bears at most (2/3) sqrt(EA EI/6) = "
+        hint << std::setprecision(4) << "; rod '" << rod.name << (sharpness < 1 ? "' bends under a moment of " : "' has given way to bending, its moment is down to ")
+             << stretch * force.norm() << " N m, and its 'energy: seed', which couples bending with stretch, bears at most (2/3) sqrt(EA EI/6) = "
              << 2.0 / 3 * std::sqrt(rod.material.axial_stiffness * bending / 6) << " N m without tension; 'energy: classical' has no limit";
       }
     });
