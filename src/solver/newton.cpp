@@ -542,7 +542,8 @@ std::string NewtonSolver::nearBarrier() const {
 std::string NewtonSolver::nearMomentLimit() const {
   const Elements &e = potential_->elements();
   const Configuration &c = potential_->start();
-  double sharpest = 0.5; // of 6 B kappa^2/EA: moments above 0.88 of the limit
+  constexpr double near = 0.88; // of the limit; where it is passed the moment falls again
+  double sharpest = 0.5;        // of 6 B kappa^2/EA: at `near`
   std::ostringstream hint;
   for (int r = rods_.begin; r < rods_.end; ++r) {
     const Rod &rod = potential_->scene().rods[r];
@@ -558,10 +559,12 @@ std::string NewtonSolver::nearMomentLimit() const {
         const double sharpness = 6 * force.squaredNorm() / (bending * stretch * stretch * rod.material.axial_stiffness);
         if (!(sharpness > sharpest)) continue;
         sharpest = sharpness;
+        const double moment = stretch * force.norm(), limit = 2.0 / 3 * std::sqrt(rod.material.axial_stiffness * bending / 6);
         hint.str("");
-        hint << std::setprecision(4) << "; rod '" << rod.name << (sharpness < 1 ? "' bends under a moment of " : "' has given way to bending, its moment is down to ")
-             << stretch * force.norm() << " N m, and its 'energy: seed', which couples bending with stretch, bears at most (2/3) sqrt(EA EI/6) = "
-             << 2.0 / 3 * std::sqrt(rod.material.axial_stiffness * bending / 6) << " N m without tension; 'energy: classical' has no limit";
+        hint << std::setprecision(4) << "; rod '" << rod.name
+             << (moment > near * limit ? "' bends under a moment of " : "' has given way to bending, its moment is down to ") << moment
+             << " N m, and its 'energy: seed', which couples bending with stretch, bears at most (2/3) sqrt(EA EI/6) = " << limit
+             << " N m without tension; 'energy: classical' has no limit";
       }
     });
   }

@@ -29,7 +29,9 @@ struct Solved {
     EXPECT_EQ(sim.setUp(std::move(scene), settings), PetscErrorCode(0));
     EXPECT_EQ(PetscOptionsClearValue(nullptr, "-snes_rtol"), PetscErrorCode(0));
     TimeLoop loop(sim.solver, settings);
-    EXPECT_EQ(loop.run(sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished), PetscErrorCode(0));
+    EXPECT_EQ(loop.run(
+                  sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished),
+              PetscErrorCode(0));
     failure = loop.failure();
   }
   Vec3 edge(int i) const { return sim.state.position[i + 1] - sim.state.position[i]; }

@@ -99,7 +99,8 @@ TEST(SceneReader, StiffnessParametersReplaceThoseOfTheSection) {
 TEST(SceneReader, OverridesReachEveryRod) {
   const std::string text = "rods:\n  - {" + line + ", material: {radius: 0.01, young: 1e6, poisson: 0.5, density: 1000}}\n  - {" + line +
                            ", measure: tan, material: {radius: 0.02, young: 1e6, poisson: 0.5, density: 1000}}\n";
-  const Scene plain = read(text).scene, changed = read(text, {{"young", "2e6"}, {"flexural_stiffness", "[3,4]"}, {"measure", "angle"}, {"energy", "classical"}}).scene;
+  const Scene plain = read(text).scene,
+              changed = read(text, {{"young", "2e6"}, {"flexural_stiffness", "[3,4]"}, {"measure", "angle"}, {"energy", "classical"}}).scene;
   for (int r = 0; r < 2; ++r) {
     EXPECT_DOUBLE_EQ(changed.rods[r].material.axial_stiffness, 2 * plain.rods[r].material.axial_stiffness);
     EXPECT_EQ(changed.rods[r].material.flexural_stiffness, (std::array<double, 2>{3, 4}));
