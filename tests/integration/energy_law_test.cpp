@@ -1,6 +1,7 @@
 /// The two laws of stretch and bending against closed forms: end couples, tension, compression, and the moment that `seed` bears at most.
 #include "support/rods.hpp"
 
+#include "tendril/dynamics/bifurcation.hpp"
 #include "tendril/energy/derived.hpp"
 
 namespace tendril::test {
@@ -130,6 +131,37 @@ TEST(Compression, GivesWayByItsLaw) {
   ASSERT_TRUE(classical.finished) << classical.failure;
   EXPECT_NEAR(classical.edge(0).norm() * 2, 0.1, 1e-6);
   EXPECT_FALSE(compressed(Energy::classical, 1.01).finished);
+}
+
+/// A column clamped at its foot under a dead load P on its head, EA L^2/EI = 50: it buckles at P = r pi^2/4 with P = EA r (1 - r^2)/2 (`seed`), or at
+/// P r = pi^2/4 with P = EA (1 - r).
+TEST(Column, BucklesByItsLaw) {
+  const double axial = 50, slender = pi * pi / 4;
+  auto critical = [&](Energy energy, int edges) {
+    Scene scene = barScene(energy, edges, axial);
+    scene.rods[0].material.flexural_stiffness = {1, 2}; // one mode at a time
+    scene.forces = {{0, edges, Vec3(-4, 0, 0)}};
+    LoopSettings settings = statics(10);
+    settings.bifurcation = Bifurcation::stop;
+    Simulation sim;
+    EXPECT_EQ(sim.setUp(scene, settings), PetscErrorCode(0));
+    TimeLoop loop(sim.solver, settings);
+    double found = 0;
+    loop.on_critical = [&](const CriticalPoint &point) {
+      found = 4 * point.load_factor;
+      return PetscErrorCode(0);
+    };
+    bool finished = false;
+    EXPECT_EQ(loop.run(sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished), PetscErrorCode(0));
+    EXPECT_TRUE(finished) << loop.failure();
+    return found;
+  };
+  for (const Energy energy : {Energy::seed, Energy::classical}) {
+    const double exact_load = energy == Energy::seed ? slender * std::sqrt(1 - 2 * slender / axial) : axial / 2 * (1 - std::sqrt(1 - 4 * slender / axial));
+    const double coarse = critical(energy, 16), fine = critical(energy, 32);
+    EXPECT_NEAR(order(std::abs(coarse - exact_load), std::abs(fine - exact_load)), 2, 0.1);
+    EXPECT_NEAR((4 * fine - coarse) / 3, exact_load, 1e-5 * exact_load); // terms of h^4
+  }
 }
 
 /// Both laws are one in the limit of a rod that does not stretch: they differ by B kappa^2/EA, here 1e-9.
