@@ -21,12 +21,13 @@ struct Sharp {
 };
 
 /// A straight rod, clamped, stiffer one way than the other: bends in space, twists and stretches. \param axial EA L^2/EI
-Scene swingScene(double axial, double stiffness_damping = 0) {
+Scene swingScene(double axial, double stiffness_damping = 0, Energy energy = Energy::seed) {
   Rod rod = straightRod(8, Measure::angle);
   rod.material.axial_stiffness = axial;
   rod.material.flexural_stiffness = {1, 2};
   rod.material.linear_rotational_inertia = 1e-2;
   rod.material.stiffness_damping_coefficient = stiffness_damping;
+  rod.energy = energy;
   return clampedScene(rod);
 }
 
@@ -67,9 +68,9 @@ Outcome runOn(Simulation &sim, const LoopSettings &settings) {
   run.state = sim.state;
   return run;
 }
-Outcome swing(const LoopSettings &settings, double axial, double stiffness_damping = 0) {
+Outcome swing(const LoopSettings &settings, double axial, double stiffness_damping = 0, Energy energy = Energy::seed) {
   Simulation sim;
-  start(sim, settings, swingScene(axial, stiffness_damping));
+  start(sim, settings, swingScene(axial, stiffness_damping, energy));
   return runOn(sim, settings);
 }
 
@@ -82,9 +83,9 @@ double apart(const State &a, const State &b, bool directors = true) {
 }
 
 /// Mean order over two halvings, without a reference: the differences of neighbours fall like the errors. A fifth of the slowest period.
-double observedOrder(const std::string &integrator, double dt, double axial, double stiffness_damping, bool directors) {
+double observedOrder(const std::string &integrator, double dt, double axial, double stiffness_damping, bool directors, Energy energy = Energy::seed) {
   State runs[4];
-  for (int k = 0; k < 4; ++k) runs[k] = swing(with(integrator, dt / (1 << k), 0.4), axial, stiffness_damping).state;
+  for (int k = 0; k < 4; ++k) runs[k] = swing(with(integrator, dt / (1 << k), 0.4), axial, stiffness_damping, energy).state;
   return 0.5 * order(apart(runs[0], runs[1], directors), apart(runs[2], runs[3], directors));
 }
 
@@ -97,6 +98,7 @@ TEST(Integrator, HasItsOrder) {
   EXPECT_NEAR(observedOrder("euler", 2.5e-3, 1e8, 0, false), 1, 0.1);
   for (const std::string &name : second_order) {
     EXPECT_NEAR(observedOrder(name, 2.5e-3, 1e2, 0, false), 2, 0.15) << name;
+    EXPECT_NEAR(observedOrder(name, 2.5e-3, 1e2, 0, false, Energy::classical), 2, 0.15) << name;
     EXPECT_NEAR(observedOrder(name, 1e-2, 1e8, 0, true), name == "sdirk2" ? 1 : 2, 0.45) << name;
   }
 }
@@ -106,6 +108,7 @@ TEST(Integrator, KeepsItsOrderWithDissipationByStiffness) {
   const Sharp sharp;
   for (const std::string &name : second_order) {
     EXPECT_NEAR(observedOrder(name, 5e-3, 1e2, 0.02, true), 2, 0.1) << name;
+    EXPECT_NEAR(observedOrder(name, 5e-3, 1e2, 0.02, true, Energy::classical), 2, 0.1) << name;
     EXPECT_NEAR(observedOrder(name, 1e-2, 1e8, 0.02, true), name == "sdirk2" ? 1 : 2, 0.2) << name;
   }
 }
