@@ -52,8 +52,8 @@ TEST(ErrorEstimate, IsTheErrorOfTheElastica) {
     }
 }
 
-/// A bar rolled up by an end couple of 9: the edges of a rod that keeps its length lie on a circle, edge i at (i + 1/2) 9/n from the clamp; the tip of the exact
-/// one is at (sin 9, 1 - cos 9)/9. Measure `angle`: within 1 %.
+/// A bar rolled up by an end couple of 9: the edges of a rod that keeps its length lie on a circle, edge i at (i + 1/2) 9/n from the clamp; the tip of the
+/// exact one is at (sin 9, 1 - cos 9)/9. Measure `angle`: within 1 %.
 TEST(ErrorEstimate, IsTheErrorOfAClassicalBar) {
   SceneFile file = readScene(std::string(TENDRIL_SOURCE_DIR) + "/data/scenes/rolled_up.yaml", {});
   Simulation run;

@@ -152,7 +152,9 @@ TEST(Column, BucklesByItsLaw) {
       return PetscErrorCode(0);
     };
     bool finished = false;
-    EXPECT_EQ(loop.run(sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished), PetscErrorCode(0));
+    EXPECT_EQ(loop.run(
+                  sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished),
+              PetscErrorCode(0));
     EXPECT_TRUE(finished) << loop.failure();
     return found;
   };
