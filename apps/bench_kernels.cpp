@@ -90,7 +90,7 @@ Cell<double> plainCell(int k) {
   c.f1.tangent = Vec3(std::cos(turning), std::sin(turning), 0);
   c.f1.director = rotateAbout<double>(transport<double>(c.f0.director, c.f0.tangent, c.f1.tangent), c.f1.tangent, twist);
   c.f1.length = 1 + 0.1 * std::cos(1.1 * k);
-  c.constants = {{1, 1.5, 0.7}, {0.1, -0.1, 0.05}, {0.5, 0.5}, {1, 1}, 0, 1};
+  c.constants = {{1, 1.5, 0.7}, {0.1, -0.1, 0.05}, 0, {0.5, 0.5}, {1, 1}, 0, 1};
   return c;
 }
 
@@ -111,6 +111,7 @@ template <class T> Cell<T> cellOf(int first) {
   }
   out.f0.length = copy([](const Cell<double> &c) { return c.f0.length; });
   out.f1.length = copy([](const Cell<double> &c) { return c.f1.length; });
+  out.constants.base = copy([](const Cell<double> &c) { return c.constants.base; });
   out.constants.turns = T(0.0);
   out.constants.sign = T(1.0);
   return out;

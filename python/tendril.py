@@ -135,6 +135,7 @@ class Rod:
     """One rod: what does not change, and its part of the fields. Frames are numbers (-1 is the last) or slices.
 
     name, closed; vertices, edges: how many; first_vertex, first_edge: their numbers in fields of all rods;
+    energy: seed or classical, the law of stretch and bending; seed in files that do not tell;
     section: circle, ellipse, rectangle, none (only stiffness was given), or unknown (format 1);
     half_axes (2,) [m] along the first and second director, nan without a section;
     radius [m]: mean of the half axes; without them that of a homogeneous round rod of this stiffness, 2 sqrt(EI/EA),
@@ -150,6 +151,7 @@ class Rod:
         self.first_vertex, self.first_edge = self._slices["vertices"].start, self._slices["edges"].start
         self.vertices = self._slices["vertices"].stop - self.first_vertex
         self.edges = self._slices["edges"].stop - self.first_edge
+        self.energy = s["energy"][index]
         self.section, self.half_axes = s["section"][index], s["half_axes"][index]
         self.material = {name: values[index] for name, values in s["material"].items()}
         self.radius = float(self.half_axes.mean())
@@ -376,6 +378,7 @@ class Trajectory:
             "cells": None if cells is None else cells[:].tolist(),
             "name": _texts(f["rods/name"]) if "rods" in f else [f"rod{k}" for k in range(count)],
             "section": _texts(f["rods/section"]) if "rods" in f else ["unknown"] * count,
+            "energy": _texts(f["rods/energy"]) if "rods/energy" in f else ["seed"] * count,
             "half_axes": f["rods/half_axes"][:] if "rods" in f else np.full((count, 2), np.nan),
             "material": {name: data[:] for name, data in f["material"].items()},
         }

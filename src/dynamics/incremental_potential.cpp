@@ -288,6 +288,7 @@ bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r,
   trial.copyEnds(elements_, r, iterate_);
   if (!retraction_.apply(iterate_, increment, scale, r, kind, trial)) return false;
   const RodRange &rod = elements_.rods[r];
+  const Energy energy = elements_.energy[r];
   for (int i = rod.first_slot; i < rod.edgeEnd(); i += lanes) {
     const Pack stiffness = read<Pack>(axial_.stiffness() + i), rest = read<Pack>(axial_.rest() + i);
     if (!step_.mixed) {
@@ -297,13 +298,14 @@ bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r,
     // dS = k (B d + c): the force the linearised strain asks for.
     const Pack inverse = read<Pack>(elements_.inverseRestLength() + i), force = read<Pack>(iterate_[C::axial_force] + i);
     const Vector3<Pack> de = readVector<Pack>(increment, 0, i + 1) - readVector<Pack>(increment, 0, i), t = readVector<Pack>(iterate_.values(), C::tangent, i);
-    Pack change = read<Pack>(iterate_[C::length] + i) * t.dot(de);
+    const Pack length = read<Pack>(iterate_[C::length] + i);
+    Pack change = length * t.dot(de);
     if (kind == RetractionKind::continued) change -= Pack(0.5) * de.squaredNorm();
     if (kind == RetractionKind::kept) { // as is the force
       write(trial[C::axial_force] + i, force);
       continue;
     }
-    const Pack strain = read<Pack>(iterate_[C::strain] + i) + change * inverse * inverse;
+    const Pack strain = read<Pack>(iterate_[C::strain] + i) + change * inverse * strainSlope<Pack>(energy, length, inverse);
     write(trial[C::axial_force] + i, Pack(force + Pack(scale) * (stiffness * (strain - rest) - force)));
   }
   return true;

@@ -115,7 +115,7 @@ void setSupports(const Scene &scene, const Elements &elements, double motion_tim
       write(t, select(live, Pack(e[a] / l), read<Pack>(t)));
     }
     write(c[C::length] + s, length);
-    write(c[C::strain] + s, axialStrain<Pack>(length, read<Pack>(elements.inverseRestLength() + s)));
+    write(c[C::strain] + s, axialStrain<Pack>(elements.energy[r], length, read<Pack>(elements.inverseRestLength() + s)));
   }
   c.closeRing(rod);
   forCells(elements, r, [&]<class T>(const LooseCell &cell, int count) {

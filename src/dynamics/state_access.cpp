@@ -166,7 +166,8 @@ void RodAccess::setPositions(const std::vector<Vec3> &x) {
     // Minimal rotations to the opposite tangent are half turns about any normal: this one is about the director.
     if (before.tangent.dot(after.tangent) > -1 + 1e-12) after.director = transport<double>(before.director, before.tangent, after.tangent);
     next.director[range_.first_edge + i] = orthonormalised(after.director, after.tangent);
-    next.axial_force[range_.first_edge + i] = rod().material.axial_stiffness * axialStrain<double>(after.length, elements_.inverseRestLength()[range_.slot(i)]);
+    next.axial_force[range_.first_edge + i] =
+        rod().material.axial_stiffness * axialStrain<double>(rod().energy, after.length, elements_.inverseRestLength()[range_.slot(i)]);
   }
   setTurns(next, cellTwists(state_), std::vector<double>(range_.edges, 0.0));
   accept(std::move(next));

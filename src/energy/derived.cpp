@@ -72,7 +72,8 @@ RodActions rodActions(const Scene &scene, const Elements &elements, const State 
       const bool damped =
           scene.rods[r].material.stiffness_damping_coefficient != 0 && state.velocity[elements.vertex0[i]] != state.velocity[elements.vertex1[i]];
       const double axial = damped ? elements.axialStiffness()[slot] * c[Configuration::strain][slot] : state.axial_force[i];
-      out.force[i] = stretchGradient(c.frameAt(slot), axial, elements.inverseRestLength()[slot]);
+      const Frame f = c.frameAt(slot);
+      out.force[i] = stretchGradient(f, axial, strainSlope(elements.energy[r], f.length, elements.inverseRestLength()[slot]));
     }
   }
   // A couple acts by a pair of forces on the ends of its edge, which is not a force in the rod.

@@ -21,7 +21,16 @@ public:
     return 0.5 * reduce(total);
   }
 
-  [[gnu::flatten]] void addDerivatives(const Configuration &configuration, int r, Derivatives &out, HessianKind hessian) const override {
+  void addDerivatives(const Configuration &configuration, int r, Derivatives &out, HessianKind hessian) const override {
+    elements_.energy[r] == Energy::seed ? assemble<Energy::seed>(configuration, r, out, hessian) : assemble<Energy::classical>(configuration, r, out, hessian);
+  }
+
+private:
+  const Elements &elements_;
+  const AxialLaw &law_;
+  bool mixed_ = true;
+
+  template <Energy law> [[gnu::flatten]] void assemble(const Configuration &configuration, int r, Derivatives &out, HessianKind hessian) const {
     const RodRange &rod = elements_.rods[r];
     const BlockPlanes blocks(out.blocks, rod);
     for (int i = rod.first_slot; i < rod.edgeEnd(); i += lanes) {
@@ -30,14 +39,15 @@ public:
       const Pack primal = stiffness * (read<Pack>(configuration[Configuration::strain] + i) - read<Pack>(law_.rest() + i));
       const Pack force = select(live, mixed_ ? read<Pack>(configuration[Configuration::axial_force] + i) : primal, Pack(0.0));
       const FrameOf<Pack> f = configuration.frames<Pack>(i);
-      const Vector3<Pack> e = stretchGradient(f, force, inverse), g = stretchGradient<Pack>(f, select(live, primal - force, Pack(0.0)), inverse);
+      const Pack slope = strainSlope<Pack>(law, f.length, inverse);
+      const Vector3<Pack> e = stretchGradient(f, force, slope), g = stretchGradient<Pack>(f, select(live, primal - force, Pack(0.0)), slope);
       // What belongs to the first vertex of the edges before what belongs to the second, whose memory overlaps: the store has left the pipeline by then.
       for (int a = 0; a < 3; ++a) {
         addTo<Pack>(out.equilibrium[a] + i, -e[a]);
         addTo<Pack>(out.gradient[a] + i, -g[a]);
       }
       if (hessian != HessianKind::none) {
-        const Matrix3<Pack> h = stretchHessian<Pack>(f, stiffness, hessian == HessianKind::exact ? force : max(force, Pack(0.0)), inverse);
+        const Matrix3<Pack> h = stretchHessian<Pack>(law, f, stiffness, hessian == HessianKind::exact ? force : max(force, Pack(0.0)), inverse, slope);
         for (int a = 0; a < 3; ++a)
           for (int b = a; b < 3; ++b) addTo(blocks.own(a, b) + i, h(a, b));
       }
@@ -47,11 +57,6 @@ public:
       }
     }
   }
-
-private:
-  const Elements &elements_;
-  const AxialLaw &law_;
-  bool mixed_ = true;
 };
 
 } // namespace
@@ -60,8 +65,10 @@ AxialLaw::AxialLaw(const Scene &scene, const Elements &elements) : scene_(scene)
   std::copy_n(elements.axialStiffness(), elements.slots, planes_[0]);
 }
 
-/// Dissipation as in the bending term: a second quadratic around the strain at the start (dampedRest). The mean of the strains at the ends of a step is
-/// that in its middle and |de|^2/(2 L^2), de by what the edge moves on either side: known from a solve before, it is a rest strain.
+/// Dissipation as in the bending term: a second quadratic around the strain at the start (dampedRest). For a force that does the work which the edge
+/// stores, a step takes the mean of the strains at its ends and the slope of the strain between them. Known from a solve before, in which the edge moves by
+/// de on either side of its middle m, what the mean has on top of the strain in the middle is a rest strain: |de|^2/(2 L^2) for `seed`; for `classical`, with
+/// the mean l of the lengths at the ends, (l - |m|)/L, and the force is along m/l, not m/|m|.
 void AxialLaw::beginStep(const Configuration &start, const Step &step, int r) {
   const double beta = scene_.rods[r].material.stiffness_damping_coefficient;
   const Rates *half = step.rule ? step.rule->half : nullptr;
@@ -73,9 +80,18 @@ void AxialLaw::beginStep(const Configuration &start, const Step &step, int r) {
     const int i = rod.slot(k), v = rod.first_vertex;
     planes_[0][i] = elements_.axialStiffness()[i] * (1 + q);
     planes_[1][i] = q / (1 + q) * dampedRest(step, start[Configuration::strain][i], i);
-    if (half)
-      planes_[1][i] -=
-          0.5 / (1 + q) * (half->vertex[v + (k + 1) % rod.vertices] - half->vertex[v + k]).squaredNorm() * std::pow(elements_.inverseRestLength()[i], 2);
+    if (!half) continue;
+    const Vec3 de = half->vertex[v + (k + 1) % rod.vertices] - half->vertex[v + k];
+    const double inverse = elements_.inverseRestLength()[i];
+    if (elements_.energy[r] == Energy::seed) {
+      planes_[1][i] -= 0.5 / (1 + q) * de.squaredNorm() * std::pow(inverse, 2);
+      continue;
+    }
+    const Vec3 before = start.edges<double>(i), m = before + de;
+    const double middle = m.norm(), across = 2 * m.dot(de);
+    const double beyond = 0.5 * ((de.squaredNorm() - across) / (before.norm() + middle) + (de.squaredNorm() + across) / ((m + de).norm() + middle));
+    planes_[0][i] *= middle / (middle + beyond);
+    planes_[1][i] -= beyond * inverse / (1 + q);
   }
 }
 

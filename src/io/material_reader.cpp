@@ -89,7 +89,7 @@ Material readMaterial(YamlMap &map, const Overrides &overrides) {
 std::vector<const Key *> rodOverrides() {
   std::vector<const Key *> rows;
   for (const Key &key : keys)
-    if (key.parent() == "rods[].material" || std::string_view(key.path) == "rods[].measure") rows.push_back(&key);
+    if (const std::string_view path = key.path; key.parent() == "rods[].material" || path == "rods[].measure" || path == "rods[].energy") rows.push_back(&key);
   return rows;
 }
 

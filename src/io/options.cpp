@@ -317,6 +317,7 @@ std::string writeOptionsFile(const std::string &path, const Options &o, const Pr
     put("name", rod.name);
     put("edges", rod.edges());
     put("measure", rod.measure == Measure::tan ? "tan" : "angle");
+    put("energy", rod.energy == Energy::seed ? "seed" : "classical");
     put("linear_density", m.linear_density);
     put("linear_rotational_inertia", m.linear_rotational_inertia);
     put("axial_stiffness", m.axial_stiffness);

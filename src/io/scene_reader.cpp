@@ -142,10 +142,13 @@ void readRod(const YamlValue &value, const Overrides &overrides, std::vector<Rod
   // Options may say all that a material needs.
   YamlMap material(map.has("rods[].material") ? map.at("rods[].material") : YamlValue(YAML::Load("{}"), value.file(), "material"), "rods[].material");
   common.material = readMaterial(material, overrides);
-  std::string measure = map.word("rods[].measure");
-  if (const auto o = overrides.find("measure"); o != overrides.end())
-    measure = YamlValue(YAML::Node(o->second), "option -rod_measure", "measure").word(*AnyKey("rods[].measure"));
-  common.measure = measure == "tan" ? Measure::tan : Measure::angle;
+  auto word = [&](KeyOf<KeyType::word, KeyType::word_or_map> key) { // of the scene, or of the option in its place
+    const std::string written = map.word(key), name(key->name());
+    const auto o = overrides.find(name);
+    return o == overrides.end() ? written : YamlValue(YAML::Node(o->second), "option -rod_" + name, name).word(*key);
+  };
+  common.measure = word("rods[].measure") == "tan" ? Measure::tan : Measure::angle;
+  common.energy = word("rods[].energy") == "seed" ? Energy::seed : Energy::classical;
   common.gravity = map.flag("rods[].gravity");
   common.initial_velocity = map.vector("rods[].velocity");
   common.initial_turns = map.number("rods[].turns");

@@ -257,7 +257,7 @@ void TrajectoryWriter::writeOrigin(const Provenance &p) {
 }
 
 void TrajectoryWriter::writeRods() {
-  std::vector<std::string> names, sections;
+  std::vector<std::string> names, sections, energies;
   std::vector<double> half_axes;
   for (const Rod &rod : scene_.rods) {
     const std::optional<Section> &section = rod.material.section;
@@ -265,11 +265,13 @@ void TrajectoryWriter::writeRods() {
     const std::array<double, 2> axes = section ? section->halfAxes() : std::array{nan, nan};
     names.push_back(rod.name);
     sections.push_back(section ? nameOf(section->shape) : "none");
+    energies.push_back(rod.energy == Energy::seed ? "seed" : "classical");
     half_axes.insert(half_axes.end(), axes.begin(), axes.end());
   }
   file_.createGroup("rods");
   file_.write("rods/name", names);
   file_.write("rods/section", sections);
+  file_.write("rods/energy", energies);
   file_.write("rods/half_axes", {rods_, 2}, half_axes.data(), "m");
 }
 

@@ -57,9 +57,10 @@ std::vector<int> firstAlike(const Scene &scene, const std::vector<Drawing> &draw
   const auto moments = byRod(scene.moments, rods);
   auto alike = [&](int r, int s) {
     const Rod &a = scene.rods[r], &b = scene.rods[s];
-    return a.material == b.material && a.measure == b.measure && a.gravity == b.gravity && a.natural == b.natural && a.natural_strain == b.natural_strain &&
-           a.initial_velocity == b.initial_velocity && a.initial_turns == b.initial_turns && sameShape(a, drawings[r], b, drawings[s]) &&
-           sameList(supports[r], supports[s]) && sameList(forces[r], forces[s]) && sameList(moments[r], moments[s]);
+    return a.material == b.material && a.measure == b.measure && a.energy == b.energy && a.gravity == b.gravity && a.natural == b.natural &&
+           a.natural_strain == b.natural_strain && a.initial_velocity == b.initial_velocity && a.initial_turns == b.initial_turns &&
+           sameShape(a, drawings[r], b, drawings[s]) && sameList(supports[r], supports[s]) && sameList(forces[r], forces[s]) &&
+           sameList(moments[r], moments[s]);
   };
   std::vector<int> first, kinds;
   for (int s = 0; s < int(rods); ++s) {

@@ -82,7 +82,10 @@ private:
   void add(int slot, const Frame &f0, const Frame &f1, double length, std::array<double, 2> weight, std::array<double, 2> free, std::array<double, 2> flexural,
            double torsional) {
     CellOf<double> cell{};
-    cell.weight = {weight[0] / length, weight[1] / length};
+    if (rod_.energy == Energy::seed)
+      cell.weight = {weight[0] / length, weight[1] / length};
+    else
+      cell.base = 1;
     cell.free = free;
     cell.sign = 1;
     std::array<double, 3> rest;
@@ -100,6 +103,7 @@ private:
       out_.cells_[cell_weight + k][slot] = cell.weight[k];
       out_.cells_[cell_free + k][slot] = free[k];
     }
+    out_.cells_[cell_base][slot] = cell.base;
   }
 };
 
@@ -114,6 +118,7 @@ Elements::Elements(const Scene &scene, const DofMap &dofs)
     const Rod &rod = scene.rods[r];
     const RodRange &range = rods[r];
     measure.push_back(rod.measure);
+    energy.push_back(rod.energy);
     for (int v = 0; v < range.vertices; ++v) {
       vertex_slot.push_back(range.slot(v));
       constants_[5][range.slot(v)] = dofs.isHeld(range.first_vertex + v) ? 0 : 1;

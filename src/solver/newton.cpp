@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
+#include <sstream>
 
 namespace tendril {
 namespace {
@@ -535,6 +537,40 @@ std::string NewtonSolver::nearBarrier() const {
   return hint;
 }
 
+/// A hint for failures of steps at whose start a rod of the energy `seed` bends about as sharply as it can: without axial force its stretch r obeys
+/// r^2 = 1 - 2 B kappa^2/EA, with kappa the turning per reference length, and the moment B r^2 kappa is largest where B kappa^2 = EA/6.
+std::string NewtonSolver::nearMomentLimit() const {
+  const Elements &e = potential_->elements();
+  const Configuration &c = potential_->start();
+  constexpr double near = 0.88; // of the limit; where it is passed the moment falls again
+  double sharpest = 0.5;        // of 6 B kappa^2/EA: at `near`
+  std::ostringstream hint;
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    const Rod &rod = potential_->scene().rods[r];
+    if (rod.energy != Energy::seed) continue;
+    forCells(e, r, [&]<class T>(const LooseCell &cells, int count) {
+      for (int l = 0; l < count; ++l) {
+        const LooseCell cell{cells.slot + l, cells.frame0 + l, cells.frame1 + l, cells.vertex + l};
+        const CellOf<double> k = cellOf<double>(e.cells(), c, cell.slot);
+        const double stretch = cellGeometry(c.frameAt(cell.frame0), c.frameAt(cell.frame1), k).stretch;
+        const std::array<double, 3> s = presentStrain<double>(e, c, r, cell);
+        const Eigen::Vector2d strain(s[0] - k.rest[0], s[1] - k.rest[1]), force(k.stiffness[0] * strain[0], k.stiffness[1] * strain[1]);
+        const double bending = force.squaredNorm() / force.dot(strain) * e.cellLength()[cell.slot]; // B about the axis of bending
+        const double sharpness = 6 * force.squaredNorm() / (bending * stretch * stretch * rod.material.axial_stiffness);
+        if (!(sharpness > sharpest)) continue;
+        sharpest = sharpness;
+        const double moment = stretch * force.norm(), limit = 2.0 / 3 * std::sqrt(rod.material.axial_stiffness * bending / 6);
+        hint.str("");
+        hint << std::setprecision(4) << "; rod '" << rod.name
+             << (moment > near * limit ? "' bends under a moment of " : "' has given way to bending, its moment is down to ") << moment
+             << " N m, and its 'energy: seed', which couples bending with stretch, bears at most (2/3) sqrt(EA EI/6) = " << limit
+             << " N m without tension; 'energy: classical' has no limit";
+      }
+    });
+  }
+  return hint.str();
+}
+
 /// Starts every rod from where its velocities lead when that is lower than the start.
 void NewtonSolver::predict(const State &start) {
   const DofMap &dofs = potential_->dofs();
@@ -627,7 +663,7 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
   }
   report_.converged = failure.empty();
   for (int r = rods_.begin; r < rods_.end; ++r) report_.rounding_error = std::max(report_.rounding_error, work_->left[r]);
-  report_.reason = report_.converged ? "converged" : failure + nearBarrier();
+  report_.reason = report_.converged ? "converged" : failure + nearBarrier() + nearMomentLimit();
   *report = report_;
   PetscFunctionReturn(0);
 }

@@ -208,6 +208,7 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
 [[gnu::flatten]] bool Retraction::updateFrames(const C &from, const Planes &increment, double scale, int r, C &to) const {
   using std::floor, std::sqrt;
   const RodRange &rod = elements_.rods[r];
+  const Energy energy = elements_.energy[r];
   for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
     const Pack::mask_type live = firstLanes(rod.edgeEnd() - s);
     const Vector3<Pack> e = to.edges<Pack>(s);
@@ -223,7 +224,7 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
     }
     const Pack kept = select(live, length, f.length);
     write(to[C::length] + s, kept);
-    write(to[C::strain] + s, axialStrain<Pack>(kept, read<Pack>(elements_.inverseRestLength() + s)));
+    write(to[C::strain] + s, axialStrain<Pack>(energy, kept, read<Pack>(elements_.inverseRestLength() + s)));
     write(to[C::spin] + s, Pack(read<Pack>(from[C::spin] + s) + angle));
   }
   to.closeRing(rod);

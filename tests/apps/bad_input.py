@@ -208,6 +208,8 @@ rows = [
     ("axis of zero", rod("helix: {axis: [0, 0, 0], length: 1, radius: 1, turns: 1, edges: 9}"), [], ["scene.yaml:5", "'axis' must not be zero"]),
     ("too many copies", rod(shape.replace("4", "1000") + "\n    copies: {count: 9999999, offset: [0, 0, 1]}"), [], ["scene.yaml:4", "vertices", "1e8"]),
     ("unknown natural shape", rod(shape + "\n    natural: curly"), [], ["scene.yaml:6", "as_drawn, straight", "curly"]),
+    ("unknown energy", rod(shape + "\n    energy: cosserat"), [], ["scene.yaml:6", "seed, classical", "cosserat"]),
+    ("energy of an override", None, ["-rod_energy", "2"], ["-rod_energy", "seed, classical"]),
     ("unknown measure", rod(shape + "\n    measure: sine"), [], ["scene.yaml:6", "tan, angle", "sine"]),
     # polyline files
     ("NaN in points", rod("file: nan.csv"), [], ["scene.yaml:5", "nan.csv:2", "not finite"]),
@@ -356,7 +358,7 @@ if variable.returncode != 1 or "'nowhere.yaml' cannot be opened" not in variable
     failures += 1
     print("PETSC_OPTIONS:", variable.stderr)
 help_text = subprocess.run([program, "-help"], capture_output=True, text=True)
-for option in "scene mode dt dt_min integrator rho_inf dt_adapt dt_rtol dt_atol dt_max t_end load_steps continuation bifurcation arclength_steps gravity output_dir output_interval output_fields error_estimate accuracy accuracy_of rounding_tolerance retraction stretch rod_young rod_measure".split():
+for option in "scene mode dt dt_min integrator rho_inf dt_adapt dt_rtol dt_atol dt_max t_end load_steps continuation bifurcation arclength_steps gravity output_dir output_interval output_fields error_estimate accuracy accuracy_of rounding_tolerance retraction stretch rod_young rod_measure rod_energy".split():
     if f"-{option}" not in help_text.stdout or help_text.returncode != 0:
         failures += 1
         print("-help does not list", option)

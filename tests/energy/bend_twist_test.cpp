@@ -38,7 +38,7 @@ Eigen::Matrix<double, cell_variables, cell_size> edgeVariables() {
   return m;
 }
 
-template <Measure measure> void expectDerivativesMatch(const RandomCell &c, double tolerance = 1e-10) {
+template <Measure measure> void expectMatch(const RandomCell &c, double tolerance) {
   const D reference = referenceEnergy<measure>(c);
   CellDerivatives<double> d;
   cellDerivatives<measure>(c.f0, c.f1, c.cell, d);
@@ -57,6 +57,10 @@ template <Measure measure> void expectDerivativesMatch(const RandomCell &c, doub
   const std::array<double, cell_size> alone = cellGradient<measure>(c.f0, c.f1, c.cell);
   for (int r = 0; r < cell_size; ++r) EXPECT_NEAR(alone[r], d.gradient[r], tolerance * reference.g.cwiseAbs().maxCoeff());
   EXPECT_NEAR(cellEnergy<measure>(c.f0, c.f1, c.cell), reference.v, std::max(1e-13, 0.5 * (tolerance - 1e-10)) * std::abs(reference.v));
+}
+
+template <Measure measure> void expectDerivativesMatch(const RandomCell &c, double tolerance = 1e-10) {
+  for (const RandomCell &cell : {c, classical(c)}) expectMatch<measure>(cell, tolerance);
 }
 
 TEST(BendTwist, DerivativesMatchAutomaticDifferentiation) {
@@ -91,6 +95,19 @@ TEST(BendTwist, DerivativesMatchOnTheHalfCellsOfClamps) {
     c.cell.weight[fixed] = 0;
     expectDerivativesMatch<Measure::tan>(c);
     expectDerivativesMatch<Measure::angle>(c);
+  }
+}
+
+/// Lengthening the edges multiplies the bending strains of `seed` and leaves those of `classical`.
+TEST(BendTwist, OnlyTheSeedsStrainsGrowWithTheLength) {
+  Random random(4);
+  for (const bool seed : {true, false}) {
+    RandomCell c = randomCell(random, 0.6);
+    if (!seed) c = classical(c);
+    const auto before = cellStrain<Measure::angle>(c.f0, c.f1, c.cell);
+    for (Frame *f : {&c.f0, &c.f1}) f->length *= 1.25;
+    const auto after = cellStrain<Measure::angle>(c.f0, c.f1, c.cell);
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(after[k], (seed && k < 2 ? 1.25 : 1) * before[k], 1e-15) << k;
   }
 }
 
@@ -139,6 +156,7 @@ TEST(BendTwist, PackLanesEqualScalars) {
   }
   f0.length = gather([](const RandomCell &c) { return c.f0.length; });
   f1.length = gather([](const RandomCell &c) { return c.f1.length; });
+  cell.base = gather([](const RandomCell &c) { return c.cell.base; });
   cell.turns = Pack(0.0);
   cell.sign = Pack(1.0);
   CellDerivatives<Pack> packed;

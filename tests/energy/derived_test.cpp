@@ -27,16 +27,18 @@ void solve(Simulation &sim, Scene scene, int load_steps = 2, const char *toleran
 RodActions actionsOf(const Simulation &sim) { return rodActions(sim.scene, *sim.elements, sim.state, sim.state.time, 1); }
 RodStrains strainsOf(const Simulation &sim) { return rodStrains(sim.scene, *sim.elements, sim.state, sim.state.time); }
 
-/// Cantilevers of both measures under a load at the tip, coarse and fine: `check(sim, edges)`.
+/// Cantilevers of both measures and energies under a load at the tip, coarse and fine: `check(sim, edges)`.
 template <class Check> void eachCantilever(const Vec3 &load, Check check) {
   for (const Measure measure : {Measure::tan, Measure::angle})
-    for (const int edges : {4, 32}) {
-      Scene scene = clampedScene(softRod(edges, measure));
-      scene.forces = {{0, edges, load}};
-      Simulation sim;
-      solve(sim, scene);
-      check(sim, edges);
-    }
+    for (const Energy energy : {Energy::seed, Energy::classical})
+      for (const int edges : {4, 32}) {
+        Scene scene = clampedScene(softRod(edges, measure));
+        scene.rods[0].energy = energy;
+        scene.forces = {{0, edges, load}};
+        Simulation sim;
+        solve(sim, scene);
+        check(sim, edges);
+      }
 }
 
 TEST(InternalForce, OfACantileverIsItsTipLoadInEveryEdge) {

@@ -52,6 +52,20 @@ TEST(ErrorEstimate, IsTheErrorOfTheElastica) {
     }
 }
 
+/// A bar rolled up by an end couple of 9: the edges of a rod that keeps its length lie on a circle, edge i at (i + 1/2) 9/n from the clamp; the tip of the
+/// exact one is at (sin 9, 1 - cos 9)/9. Measure `angle`: within 1 %.
+TEST(ErrorEstimate, IsTheErrorOfAClassicalBar) {
+  SceneFile file = readScene(std::string(TENDRIL_SOURCE_DIR) + "/data/scenes/rolled_up.yaml", {});
+  Simulation run;
+  Estimate e;
+  estimateOf(file, {32}, statics(10), run, e);
+  ASSERT_EQ(e.none, "");
+  const Vec3 exact(std::sin(9) / 9, (1 - std::cos(9)) / 9, 0);
+  const double error = (run.state.position.back() - exact).norm();
+  EXPECT_GT(error, 1e-4);
+  EXPECT_NEAR(e.error.back(), error, 0.01 * error);
+}
+
 TEST(ErrorEstimate, IsTheErrorOfASpring) {
   const SceneFile file = verifyScene("spring");
   Simulation run;

@@ -99,6 +99,15 @@ TEST(StateAccess, PositionsTakeFramesAndForcesAlong) {
   for (Vec3 &v : x) v *= 1.25;
   rod.setPositions(x);
   for (const double force : rod.axialForces()) EXPECT_NEAR(force, 0.25 * 1e7 * 0.01 * 0.006 * 1.125, 1e-8); // seed's strain, (l^2/L^2 - 1)/2
+  Scene classical = sim.scene;
+  for (Rod &r : classical.rods) r.energy = Energy::classical;
+  Simulation other;
+  EXPECT_PETSC(other.setUp(classical, statics()));
+  RodAccess bar(other, 1);
+  x = bar.positions();
+  for (Vec3 &v : x) v *= 1.25;
+  bar.setPositions(x);
+  for (const double force : bar.axialForces()) EXPECT_NEAR(force, 0.25 * 1e7 * 0.01 * 0.006, 1e-8);
 }
 
 /// Twist angles count whole turns and give the energy GJ phi^2 / 2 Lbar of each cell.

@@ -31,6 +31,7 @@ TEST(SceneReader, DefaultsAreTheStiffnessParametersOfAThinRod) {
   EXPECT_FALSE(rod.closed);
   EXPECT_TRUE(rod.gravity);
   EXPECT_EQ(rod.measure, Measure::tan);
+  EXPECT_EQ(rod.energy, Energy::seed);
   EXPECT_EQ(rod.natural, Rod::Natural::as_drawn);
   EXPECT_EQ(scene.gravity, Vec3(0, -9.81, 0));
   EXPECT_EQ(m.linear_density, 1e-1);
@@ -98,11 +99,13 @@ TEST(SceneReader, StiffnessParametersReplaceThoseOfTheSection) {
 TEST(SceneReader, OverridesReachEveryRod) {
   const std::string text = "rods:\n  - {" + line + ", material: {radius: 0.01, young: 1e6, poisson: 0.5, density: 1000}}\n  - {" + line +
                            ", measure: tan, material: {radius: 0.02, young: 1e6, poisson: 0.5, density: 1000}}\n";
-  const Scene plain = read(text).scene, changed = read(text, {{"young", "2e6"}, {"flexural_stiffness", "[3,4]"}, {"measure", "angle"}}).scene;
+  const Scene plain = read(text).scene,
+              changed = read(text, {{"young", "2e6"}, {"flexural_stiffness", "[3,4]"}, {"measure", "angle"}, {"energy", "classical"}}).scene;
   for (int r = 0; r < 2; ++r) {
     EXPECT_DOUBLE_EQ(changed.rods[r].material.axial_stiffness, 2 * plain.rods[r].material.axial_stiffness);
     EXPECT_EQ(changed.rods[r].material.flexural_stiffness, (std::array<double, 2>{3, 4}));
     EXPECT_EQ(changed.rods[r].measure, Measure::angle);
+    EXPECT_EQ(changed.rods[r].energy, Energy::classical);
   }
   EXPECT_EQ(read("rods:\n  - " + line + "\n", {{"axial_stiffness", "7"}}).scene.rods[0].material.axial_stiffness, 7); // a rod without a material
 }

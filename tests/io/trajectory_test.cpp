@@ -16,6 +16,7 @@ Scene mixedScene() {
   strip.material = homogeneousMaterial({SectionShape::rectangle, {0.02, 0.004}}, 1e9, 4e8, 1000);
   ring.name = "r\xc3\xadng"; // UTF-8
   ring.closed = true;
+  ring.energy = Energy::classical;
   ring.position = ringShape(Vec3(0, 2, 0), Vec3::UnitZ(), 0.3, 5).points;
   ring.material = homogeneousMaterial({SectionShape::circle, {0.01, 0}}, 1e7, 4e6, 1000);
   setBishopDirectors(ring);
@@ -78,6 +79,7 @@ TEST(Trajectory, TellsNamesSectionsAndHalfAxesOfRods) {
   const Written written(mixedScene());
   EXPECT_EQ(written.version(), 2);
   EXPECT_EQ(written.strings("rods/name"), (std::vector<std::string>{"strip", "r\xc3\xadng", "cable"}));
+  EXPECT_EQ(written.strings("rods/energy"), (std::vector<std::string>{"seed", "classical", "seed"}));
   EXPECT_EQ(written.strings("rods/section"), (std::vector<std::string>{"rectangle", "circle", "none"}));
   const Hdf5Dataset data = H5Dopen2(written.file().id(), "rods/half_axes", H5P_DEFAULT);
   double axes[3][2];

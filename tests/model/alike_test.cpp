@@ -30,6 +30,7 @@ TEST(Alike, WhateverMovesARodCounts) {
   EXPECT_EQ(kindsAfter([](Scene &s, int r) { s.rods[r].material.mass_damping_coefficient = 1; }), others);
   EXPECT_EQ(kindsAfter([](Scene &s, int r) { s.rods[r].initial_velocity.z() = 1; }), others);
   EXPECT_EQ(kindsAfter([](Scene &s, int r) { s.rods[r].measure = Measure::angle; }), others);
+  EXPECT_EQ(kindsAfter([](Scene &s, int r) { s.rods[r].energy = Energy::classical; }), others);
   EXPECT_EQ(kindsAfter([](Scene &s, int r) { s.rods[r].director[3] = s.rods[r].edge(3).normalized().cross(s.rods[r].director[3]); }), others);
   EXPECT_EQ(kindsAfter([](Scene &s, int r) { s.supports[r].kind = Support::Kind::pin; }), others);
   EXPECT_EQ(kindsAfter([](Scene &s, int r) { s.supports[r].motion.table = {{0, Vec3::Zero(), Vec3::Zero()}, {1, Vec3::UnitX(), Vec3::Zero()}}; }), others);

@@ -23,7 +23,7 @@ simulation: {dt: 0.125, t_end: 0.5}
 rods:
   - {name: strip, line: {from: [0, 0, 0], to: [1, 0, 0], edges: 4}, measure: angle, velocity: [1, 0, 0],
      material: {width: 0.02, height: 0.004, young: 1e6, poisson: 0.25, density: 1000}}
-  - {name: ring, ring: {center: [0, 0, 2], radius: 0.5, edges: 6}, measure: angle, velocity: [1, 0, 0],
+  - {name: ring, ring: {center: [0, 0, 2], radius: 0.5, edges: 6}, measure: angle, energy: classical, velocity: [1, 0, 0],
      material: {radii: [0.01, 0.02], young: 1e6, poisson: 0.25, density: 1000}}
   - {name: cable, file: cable.csv, velocity: [1, 0, 0],
      material: {linear_density: 0.1, axial_stiffness: 100, flexural_stiffness: 0}}
@@ -115,6 +115,7 @@ def rods_and_origin(folder):
     assert [r.name for r in t.rods] == ["strip", "ring", "cable"] and t.rods["ring"].closed and not strip.closed
     assert [(r.vertices, r.edges, r.first_vertex) for r in t.rods] == [(5, 4, 0), (6, 6, 5), (3, 2, 11)]
     assert [r.section for r in t.rods] == ["rectangle", "ellipse", "none"] and len(t.rods[1:]) == 2
+    assert [r.energy for r in t.rods] == ["seed", "classical", "seed"]
     assert np.allclose([strip.half_axes, ring.half_axes], [[0.01, 0.002], [0.01, 0.02]], 1e-15)
     assert np.isnan(cable.half_axes).all() and np.isnan(cable.radius) and cable.reference("radius").tolist() == [0] * 3
     assert abs(strip.radius - 0.006) < 1e-15 and np.allclose(strip.reference("radius"), 0.006, 1e-15)

@@ -47,10 +47,18 @@ inline RandomCell randomCell(Random &random, double fold) {
     c.cell.stiffness[k] = 1.5 + random();
     c.cell.rest[k] = random();
   }
+  c.cell.base = 0;
   c.cell.weight = {0.5 + 0.1 * random(), 0.5 + 0.1 * random()};
   c.cell.free = {1, 1};
   c.cell.turns = 0;
   c.cell.sign = 1;
+  return c;
+}
+
+/// The same cell under the law `classical`.
+inline RandomCell classical(RandomCell c) {
+  c.cell.base = 1;
+  c.cell.weight = {0, 0};
   return c;
 }
 
@@ -64,6 +72,7 @@ template <class T> CellOf<T> cast(const CellOf<double> &c) {
     r.weight[k] = T(c.weight[k]);
     r.free[k] = T(c.free[k]);
   }
+  r.base = T(c.base);
   r.turns = T(c.turns);
   r.sign = T(c.sign);
   return r;

@@ -13,6 +13,9 @@ namespace tendril {
 /// How an angle between neighbouring edges becomes a strain: `tan` is 2 tan(angle/2), a barrier at 180 degrees; `angle` is the angle itself.
 enum class Measure { tan, angle };
 
+/// How stretch and bending go together: `seed` multiplies bending strains by the stretch, `classical` does not. Axial strains: axialStrain.
+enum class Energy { seed, classical };
+
 /// Unknowns of a cell in the order x_{i-1}, theta_{i-1}, x_i, theta_i, x_{i+1}.
 inline constexpr int cell_size = 11;
 /// Edge variables of a cell in the order e_{i-1}, theta_{i-1}, e_i, theta_i, of which its energy is a function; entries of the upper triangle of
@@ -23,7 +26,8 @@ inline constexpr int cell_variables = 8, cell_pairs = cell_variables * (cell_var
 template <class T> struct CellOf {
   std::array<T, 3> stiffness; ///< (kb1, kb2, kt) / Lbar [N m]
   std::array<T, 3> rest;      ///< strains at which the energy vanishes, integrated over the cell [rad]
-  std::array<T, 2> weight;    ///< lbar / Lbar = weight0 l0 + weight1 l1 [1/m]
+  T base;                     ///< factor of the bending strains = base + weight0 l0 + weight1 l1: lbar / Lbar (`seed`) or 1 (`classical`)
+  std::array<T, 2> weight;    ///< [1/m]
   std::array<T, 2> free;
   T turns; ///< 2 pi x whole turns in the twist angle (`angle` measure; 0 for `tan`) [rad]
   T sign;  ///< -1 when the number of whole turns is odd, else 1
@@ -67,7 +71,7 @@ template <class T> struct CellGeometry {
   HalfAngle<T> half;  ///< of the twist angle, whole turns included in the signs
   Vector3<T> d1, d2;  ///< mean directors, carried back to the first tangent
   T kappa1, kappa2;   ///< binormal . d1, binormal . d2
-  T stretch;          ///< lbar / Lbar
+  T stretch;          ///< factor of the bending strains
 };
 
 template <class T> CellGeometry<T> cellGeometry(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell) {
@@ -82,7 +86,7 @@ template <class T> CellGeometry<T> cellGeometry(const FrameOf<T> &f0, const Fram
   g.d2 = second * g.half.cosine - f0.director * g.half.sine;
   g.kappa1 = g.binormal.dot(g.d1);
   g.kappa2 = g.binormal.dot(g.d2);
-  g.stretch = cell.weight[0] * f0.length + cell.weight[1] * f1.length;
+  g.stretch = (cell.weight[0] * f0.length + cell.weight[1] * f1.length) + cell.base;
   return g;
 }
 
@@ -98,7 +102,7 @@ template <Measure measure, class T> std::array<T, 3> twistMeasure(const HalfAngl
 }
 
 /// Strains of a cell integrated over it (bending about d1 and d2, twist) [rad], before the rest strains are taken off.
-/// kappa_alpha Lbar = (lbar/Lbar) kbar.e_alpha, tau Lbar = 2 tan(angle/2).
+/// kappa_alpha Lbar = stretch kbar.d_alpha, tau Lbar = 2 tan(angle/2).
 template <Measure measure, class T> std::array<T, 3> cellStrain(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell) {
   const CellGeometry<T> g = cellGeometry(f0, f1, cell);
   T factor = g.stretch;

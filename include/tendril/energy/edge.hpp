@@ -1,27 +1,33 @@
 #pragma once
 /// \file edge.hpp
-/// Energies of one edge: stretch (St. Venant-Kirchhoff in the Green-Lagrange strain) and the inertia of its twist over a step.
+/// Energies of one edge: stretch, of either law, and the inertia of its twist over a step.
 
-#include "tendril/geometry/frame.hpp"
-
-#include <array>
+#include "tendril/energy/bend_twist.hpp"
 
 namespace tendril {
 
-/// Axial Green-Lagrange strain of an edge: ((l/L)^2 - 1)/2, written so that small strains keep their digits.
-template <class T> T axialStrain(const T &length, const T &inverse_rest_length) {
+/// Axial strain of an edge: ((l/L)^2 - 1)/2 (`seed`; St. Venant-Kirchhoff in the Green-Lagrange strain) or l/L - 1 (`classical`; Hooke), written so that
+/// small strains keep their digits. The stretch energy is 1/2 k strain^2 L.
+template <class T> T axialStrain(Energy energy, const T &length, const T &inverse_rest_length) {
+  if (energy == Energy::classical) return length * inverse_rest_length - T(1.0);
   return (length * inverse_rest_length - T(1.0)) * (length * inverse_rest_length + T(1.0)) * T(0.5);
 }
 
-/// Coefficients of the stretch energy's derivatives over the edge vector e = l t: gradient = force q with q = e/L, Hessian =
-/// (stiffness/L) q q' + (tension/L) I. In the primal form tension = force = k (strain - rest).
-template <class T> Vector3<T> stretchGradient(const FrameOf<T> &f, const T &force, const T &inverse_rest_length) {
-  return f.tangent * (force * f.length * inverse_rest_length);
+/// L times the derivative of the axial strain by l^2/2 [1/m]: 1/L or 1/l.
+template <class T> T strainSlope(Energy energy, const T &length, const T &inverse_rest_length) {
+  return energy == Energy::classical ? T(T(1.0) / length) : inverse_rest_length;
 }
-template <class T> Matrix3<T> stretchHessian(const FrameOf<T> &f, const T &stiffness, const T &tension, const T &inverse_rest_length) {
-  const T r = f.length * inverse_rest_length;
-  Matrix3<T> h = (f.tangent * (stiffness * inverse_rest_length * r * r)) * f.tangent.transpose();
-  for (int k = 0; k < 3; ++k) h(k, k) = h(k, k) + tension * inverse_rest_length;
+
+/// Derivatives of the stretch energy over the edge vector e = l t: gradient = force q with q = slope e (strainSlope), Hessian =
+/// (stiffness/L) q q' + tension slope I, for `classical` I - t t'. In the primal form tension = force = k (strain - rest).
+template <class T> Vector3<T> stretchGradient(const FrameOf<T> &f, const T &force, const T &slope) { return f.tangent * (force * f.length * slope); }
+template <class T>
+Matrix3<T> stretchHessian(Energy energy, const FrameOf<T> &f, const T &stiffness, const T &tension, const T &inverse_rest_length, const T &slope) {
+  const T r = f.length * slope;
+  T along = stiffness * inverse_rest_length * r * r;
+  if (energy == Energy::classical) along = along - tension * slope;
+  Matrix3<T> h = (f.tangent * along) * f.tangent.transpose();
+  for (int k = 0; k < 3; ++k) h(k, k) = h(k, k) + tension * slope;
   return h;
 }
 

@@ -18,6 +18,7 @@ class Elements {
 public:
   std::vector<RodRange> rods;
   std::vector<Measure> measure; ///< per rod
+  std::vector<Energy> energy;   ///< per rod
   int slots = 0;                ///< those of DofMap, then those of loose cells and their frames
 
   /// Regular cells of a rod, [begin, end): the cell at slot s joins the frames at s - 1 and s.
@@ -38,7 +39,7 @@ public:
   const double *twistMass() const { return constants_[4]; }           ///< r_L L of edges [kg m^2]
   const double *freedom() const { return constants_[5]; }             ///< 1 for vertices that are not held
   const double *cellLength() const { return constants_[6]; }          ///< Lbar [m]
-  /// stiffness, 3 planes; rest, 3; weight, 2; free, 2 (CellOf)
+  /// stiffness, 3 planes; rest, 3; weight, 2; free, 2; base, 1 (CellOf)
   const Planes &cells() const { return cells_; }
   int vertices() const { return int(vertex_slot.size()); }
   int edges() const { return int(edge_slot.size()); }
@@ -56,7 +57,7 @@ std::vector<LooseCell> cellsOf(const Elements &elements, int rod);
 int edgeAt(const RodRange &rod, int slot);
 
 /// Planes of Elements::cells().
-enum CellPlane : int { cell_stiffness = 0, cell_rest = 3, cell_weight = 6, cell_free = 8, cell_planes = 10 };
+enum CellPlane : int { cell_stiffness = 0, cell_rest = 3, cell_weight = 6, cell_free = 8, cell_base = 10, cell_planes = 11 };
 
 /// Constants of the cell (or pack of cells) at a slot, without turns.
 template <class T> CellOf<T> readCell(const Planes &cells, int slot) {
@@ -69,6 +70,7 @@ template <class T> CellOf<T> readCell(const Planes &cells, int slot) {
     c.weight[k] = read<T>(cells[cell_weight + k] + slot);
     c.free[k] = read<T>(cells[cell_free + k] + slot);
   }
+  c.base = read<T>(cells[cell_base] + slot);
   c.turns = T(0.0);
   c.sign = T(1.0);
   return c;

@@ -24,6 +24,7 @@ struct Rod {
   std::vector<Vec3> director; ///< first directors (ne), unit, normal to their edges
   Material material;
   Measure measure = Measure::tan;
+  Energy energy = Energy::seed;
   bool gravity = true;
   /// Natural curvature about the two directors and twist (each [1/m]) where the rod is not stress-free as drawn.
   enum class Natural { as_drawn, given } natural = Natural::as_drawn;

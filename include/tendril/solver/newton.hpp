@@ -150,6 +150,7 @@ private:
     std::fill(values.begin() + rods_.begin, values.begin() + rods_.end, value);
   }
   std::string nearBarrier() const;
+  std::string nearMomentLimit() const;
 };
 
 /// Registers the line search type `retraction` and the factorisation `banded`; call after PetscInitialize.
