@@ -13,10 +13,14 @@ struct Entry {
 constexpr Entry entries[] = {
     {"euler", "backward Euler, first order, most dissipative", makeEuler},
     {"bdf2", "second order, L-stable, keeps its order on stiff rods", makeBdf2},
+    {"bdf3", "third order, for motion that stiffness damps: what is not damped may grow", makeBdf3},
     {"sdirk2", "second order, L-stable, two solves a step, first order on stiff rods", makeSdirk2},
+    {"sdirk23", "third order, A-stable, two solves a step", makeSdirk23},
+    {"sdirk33", "third order, L-stable, three solves a step", makeSdirk33},
     {"midpoint", "second order, keeps the energy within a band, damps nothing", makeMidpoint},
     {"generalized_alpha", "second order, damps high frequencies by -rho_inf", makeGeneralizedAlpha},
-    {"energy_momentum", "midpoint that keeps the energy of stiff rods, too, two solves a step", makeEnergyMomentum},
+    {"symplectic2", "as midpoint, of two stages: half its step at twice its cost", makeSymplectic2},
+    {"energy_momentum", "midpoint that keeps the energy of stiff rods, too, two to five solves a step", makeEnergyMomentum},
 };
 
 } // namespace
@@ -47,8 +51,7 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
     if (possible) {
       before = strainsOf(elements, earlier);
       rest.damping_dt = moment;
-      rest.damping_memory = -1;
-      rest.strains = &before;
+      rest.damping_past = {{-1, before.data()}};
       solver.begin(state, step);
     }
   }
