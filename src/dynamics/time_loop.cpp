@@ -38,11 +38,14 @@ PetscErrorCode TimeLoop::solveStages(const State &start, const Step &step, Newto
   const bool dissipates = potential.scene().stiffnessDissipates();
   stages_.clear();
   for (bool more = true; more;) {
-    const StageRule rule = integrator_->stage(start, step.dt, stages_);
+    StageRule rule = integrator_->stage(start, step.dt, stages_);
     Step stage = step;
     stage.dt = rule.dt;
     stage.rule = integrator_->leavesChords() ? nullptr : &rule;
     if (rule.fraction != 1) stage.time = start.time + rule.fraction * step.dt;
+    std::vector<double> behind;
+    if (dissipates && rule.tangent_rates) behind = strainsBehind(solver_, start, stage);
+    if (!behind.empty()) rule.damping_past = {{-1, behind.data()}};
     NewtonReport one;
     PetscCall(solver_.solve(start, stage, &one));
     const int iterations = one.iterations;
@@ -70,7 +73,8 @@ void TimeLoop::finishStages(State &state, double h) {
   const bool keeps = integrator_->remembersStrains() > 0 && scene.stiffnessDissipates();
   if (keeps) {
     std::vector<double> before = strainsOf(potential.elements(), potential.start());
-    if (integrator_->remembersStrains() > 1) before.insert(before.end(), state.strains.begin(), state.strains.begin() + std::min(before.size(), state.strains.size()));
+    if (integrator_->remembersStrains() > 1)
+      before.insert(before.end(), state.strains.begin(), state.strains.begin() + std::min(before.size(), state.strains.size()));
     state.strains = std::move(before);
   }
   if (keeps && !integrator_->endsAtStage()) // as far beyond the middle

@@ -74,7 +74,7 @@ double ratio(const std::string &integrator, double time, double h, double growth
   sim.state.memory.clear();
   sim.state.strains.clear();
   sim.state.last_dt = 0;
-  runOn(sim, "sdirk2", h / 32, time + h);
+  runOn(sim, "sdirk33", h / 32, time + h);
   return estimate / apart(end, sim.state);
 }
 

@@ -39,6 +39,11 @@ public:
 /// Accelerations of a state from the forces on it. \param h about the length of a step [s]
 Rates startAcceleration(StepSolver &solver, double h, const State &state);
 
+/// Strains s0 for which (s - s0)/damping_dt is the rate that the velocities of a stage give the strains s: found at its guess, where s0 differs from that of
+/// the solution by second derivatives of the strains times what the guess is off. Empty where the guess is impossible. In differences of the stages' own
+/// strains the squares of motions leave an error of first order in the step, which does not matter to methods of second order whose last stage is the end.
+std::vector<double> strainsBehind(StepSolver &solver, const State &start, const Step &stage);
+
 struct IntegratorSettings {
   std::string name = "euler";
   double rho_inf = 0.8; ///< generalized_alpha: spectral radius at infinite frequency

@@ -51,6 +51,7 @@ struct StageRule {
     const double *strains; ///< as strainsOf
   };
   std::vector<PastStrains> damping_past;
+  bool tangent_rates = false;  ///< strain rates are those of the velocities (strainsBehind) instead
   Combination guess;           ///< of d, to start Newton from [m]
   Combination halfway;         ///< of d, half-way in time to the guess: frames follow the curve through both (carryFrames); empty: a great circle [m]
   const Rates *half = nullptr; ///< displacements to the middle of the step: axial forces come from the mean of the strains at both its ends (AxialLaw)

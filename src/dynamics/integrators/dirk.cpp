@@ -53,6 +53,7 @@ public:
       rule.acceleration.add(-a_(k, j) * h, done[j].acceleration);
       if (!done[j].strains.empty()) rule.damping_past.push_back({g * inverse_(k, j), done[j].strains.data()});
     }
+    rule.tangent_rates = order_ > 2;
     rule.guess.add(c_[k] * h, start);
     if (k > 0 || order_ > 2) rule.guess.add(a_.row(k).dot(c_) * h * h, k > 0 ? done.back().acceleration : start.memory.back());
     if (order_ > 2 && stiffly_accurate_ && k == stages_ - 1) rule.halfway.add(0.5 * h, start).add(0.125 * h * h, done.back().acceleration);
@@ -119,8 +120,8 @@ std::unique_ptr<Integrator> makeSdirk33(const IntegratorSettings &) {
   return std::make_unique<Dirk>(3, Eigen::MatrixXd{{g, 0, 0}, {0.5 * (1 - g), g, 0}, {-0.25 * (6 * g * g - 16 * g + 1), 0.25 * (6 * g * g - 20 * g + 5), g}});
 }
 
-/// Symplectic methods of this kind are compositions of midpoint rules over b_k h (Sanz-Serna and Abia 1991). Of two stages, none is of third order; the least error
-/// of second order has equal steps.
+/// Symplectic methods of this kind are compositions of midpoint rules over b_k h (Sanz-Serna and Abia 1991). Of two stages, none is of third order; the least
+/// error of second order has equal steps.
 std::unique_ptr<Integrator> makeSymplectic2(const IntegratorSettings &) {
   return std::make_unique<Dirk>(2, Eigen::MatrixXd{{0.25, 0}, {0.5, 0.25}}, Eigen::VectorXd{{0.5, 0.5}});
 }

@@ -72,6 +72,41 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
   return a;
 }
 
+std::vector<double> strainsBehind(StepSolver &solver, const State &start, const Step &stage) {
+  IncrementalPotential &potential = solver.potential();
+  const Elements &elements = potential.elements();
+  const StageRule &rule = *stage.rule;
+  const double moment = 1e-3; // of damping_dt: long enough for the strains to change by more than their rounding, and its square is nothing
+  Planes moved = potential.dofs().makePlanes();
+  Configuration there;
+  auto at = [&](double later) { // supports, too
+    Step then = stage;
+    then.time += later;
+    solver.begin(start, then);
+    const double along = 1 + later / rule.dt;
+    for (const RodRange &rod : elements.rods) {
+      for (int i = 0; i < rod.vertices; ++i) {
+        const int v = rod.first_vertex + i;
+        moved.setVector(0, rod.slot(i), elements.freedom()[rod.slot(i)] * (along * rule.guess.atVertex(v) + later * rule.velocity.atVertex(v)));
+      }
+      for (int i = 0; rod.twist && i < rod.edges; ++i) {
+        const int e = rod.first_edge + i;
+        moved[3][rod.slot(i)] = along * rule.guess.atEdge(e) + later * rule.velocity.atEdge(e);
+      }
+      potential.dofs().copyBehindRing(rod, moved);
+    }
+    potential.remainingMotion(potential.all(), moved);
+    for (int r = 0; r < potential.all().end; ++r)
+      if (!potential.tryMove(moved, 1, r, RetractionKind::additive, there)) return std::vector<double>();
+    return strainsOf(elements, there);
+  };
+  std::vector<double> behind = at(0);
+  const std::vector<double> before = at(-moment * rule.damping_dt), after = at(moment * rule.damping_dt);
+  if (behind.empty() || before.empty() || after.empty()) return {};
+  for (std::size_t k = 0; k < behind.size(); ++k) behind[k] -= (after[k] - before[k]) / (2 * moment);
+  return behind;
+}
+
 std::vector<std::string> integratorNames() {
   std::vector<std::string> names;
   for (const Entry &e : entries) names.emplace_back(e.name);

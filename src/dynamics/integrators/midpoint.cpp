@@ -3,8 +3,8 @@
 /// With the axial force of an edge from the mean S of its strains at both ends of the step instead of its strain in the middle, what it does over the step is
 /// what the edge stores: strains are quadratic in positions, so that their change is B(middle) times the displacement (Simo, Tarnow and Doblare 1995). But
 /// S B(middle) is no gradient: d S = (m + de)/L^2, while the force points along the middle's edge m. So a step solves first for the middle, then with
-/// |de|^2/(2 L^2), what the mean has on top of the strain in the middle, as the solve before found it, until one iteration of Newton's method is enough. Each is
-/// a potential with forces along m.
+/// |de|^2/(2 L^2), what the mean has on top of the strain in the middle, as the solve before found it, until one iteration of Newton's method is enough. Each
+/// is a potential with forces along m.
 #include "tendril/dynamics/integrator.hpp"
 
 namespace tendril {
