@@ -13,21 +13,20 @@ public:
   /// \param b the last row of `a` when empty
   Dirk(int order, const Eigen::MatrixXd &a, const Eigen::VectorXd &b = {})
       : order_(order), stages_(int(a.rows())), stiffly_accurate_(b.size() == 0), a_(a), b_(stiffly_accurate_ ? Eigen::VectorXd(a.row(stages_ - 1)) : b),
-        c_(a.rowwise().sum()), inverse_(a.inverse()), error_weights_(Eigen::VectorXd::Zero(stages_ + 2)) {
+        c_(a.rowwise().sum()), inverse_(a.inverse()) {
     if (stiffly_accurate_) c_[stages_ - 1] = 1; // the end of the step to the last bit
-    // What h^k x^(k + 1) has in the velocities of the start, of the stages and of the end; in all of them the error of the stages themselves is allowed for.
-    Eigen::MatrixXd parts = Eigen::MatrixXd::Zero(order_ + 1, stages_ + 2);
+    // What h^k x^(k + 1) has in the velocities of the start and of the stages; the error of the stages themselves is allowed for.
+    Eigen::MatrixXd parts = Eigen::MatrixXd::Zero(order_ + 1, stages_ + 1);
     parts.row(0).setOnes();
     Eigen::VectorXd power = Eigen::VectorXd::Ones(stages_);
     for (int k = 1; k <= order_; ++k) {
-      parts(k, stages_ + 1) = b_.dot(power);
       power = a_ * power;
-      parts.row(k).segment(1, stages_) = power.transpose();
+      parts.row(k).tail(stages_) = power.transpose();
     }
     double factorial = 1;
     for (int k = 2; k <= order_ + 1; ++k) factorial *= k;
-    const Eigen::VectorXd wanted = (b_.dot(power) - 1 / factorial) * Eigen::VectorXd::Unit(order_ + 1, order_);
-    error_weights_.head(order_ + 1) = parts.leftCols(order_ + 1).fullPivLu().solve(wanted); // of the first velocities that are enough
+    error_constant_ = b_.dot(power) - 1 / factorial;
+    if (stages_ >= order_) error_weights_ = parts.inverse() * (error_constant_ * Eigen::VectorXd::Unit(order_ + 1, order_));
   }
 
   int order() const override { return order_; }
@@ -53,7 +52,7 @@ public:
       rule.acceleration.add(-a_(k, j) * h, done[j].acceleration);
       if (!done[j].strains.empty()) rule.damping_past.push_back({g * inverse_(k, j), done[j].strains.data()});
     }
-    rule.tangent_rates = order_ > 2;
+    rule.tangent_rates = order_ > 2 || !stiffly_accurate_;
     rule.guess.add(c_[k] * h, start);
     if (k > 0 || order_ > 2) rule.guess.add(a_.row(k).dot(c_) * h * h, k > 0 ? done.back().acceleration : start.memory.back());
     if (order_ > 2 && stiffly_accurate_ && k == stages_ - 1) rule.halfway.add(0.5 * h, start).add(0.125 * h * h, done.back().acceleration);
@@ -69,12 +68,21 @@ public:
     return end;
   }
 
-  /// (b A^p 1 - 1/(p + 1)!) h^(p + 1) x^(p + 1), as of a linear motion, by the velocities of the start, the stages and the end.
+  /// (b A^p 1 - 1/(p + 1)!) h^(p + 1) x^(p + 1), as of a linear motion, by the velocities of the start and the stages; where those are too few, by the
+  /// accelerations of the stages and of the last stage of the step before.
   Combination error(const State &start, double h, const Stages &done) const override {
     Combination error;
-    error.add(h * (error_weights_[0] + error_weights_[stages_ + 1]), start);
-    for (int k = 0; k < stages_; ++k) error.add(h * error_weights_[k + 1], done[k].velocity);
-    for (int k = 0; k < stages_ && error_weights_[stages_ + 1] != 0; ++k) error.add(h * h * error_weights_[stages_ + 1] * b_[k], done[k].acceleration);
+    if (stages_ >= order_) {
+      error.add(h * error_weights_[0], start);
+      for (int k = 0; k < stages_; ++k) error.add(h * error_weights_[k + 1], done[k].velocity);
+      return error;
+    }
+    const double before = start.last_dt / h, late = c_[1], offset = a_.row(1).dot(c_);
+    Eigen::Matrix3d parts;
+    parts << 1, 1, 1, (late - 1) * before, c_[0], c_[1], (0.5 - late + offset) * before * before, a_.row(0).dot(c_), offset;
+    const Eigen::Vector3d weights = parts.inverse() * Eigen::Vector3d(0, 0, error_constant_ * h * h);
+    error.add(weights[0], start.memory.back());
+    for (int k = 0; k < stages_; ++k) error.add(weights[k + 1], done[k].acceleration);
     return error;
   }
 
@@ -97,7 +105,8 @@ private:
   Eigen::MatrixXd a_;
   Eigen::VectorXd b_, c_;
   Eigen::MatrixXd inverse_;
-  Eigen::VectorXd error_weights_; ///< of the velocities of the start, of the stages and of the end
+  double error_constant_;
+  Eigen::VectorXd error_weights_; ///< of the velocities of the start and of the stages
 };
 
 } // namespace

@@ -103,7 +103,15 @@ std::vector<double> strainsBehind(StepSolver &solver, const State &start, const 
   std::vector<double> behind = at(0);
   const std::vector<double> before = at(-moment * rule.damping_dt), after = at(moment * rule.damping_dt);
   if (behind.empty() || before.empty() || after.empty()) return {};
-  for (std::size_t k = 0; k < behind.size(); ++k) behind[k] -= (after[k] - before[k]) / (2 * moment);
+  // Differences of the stages' strains instead where both are far apart: there the solution is far from the guess.
+  constexpr double far = 0.05; // [rad]
+  const std::vector<double> first = strainsOf(elements, potential.start());
+  for (std::size_t k = 0; k < behind.size(); ++k) {
+    double difference = first[k];
+    for (const StageRule::PastStrains &past : rule.damping_past) difference += past.weight * (first[k] - past.strains[k]);
+    behind[k] -= (after[k] - before[k]) / (2 * moment);
+    if (!(std::abs(behind[k] - difference) < far)) behind[k] = difference;
+  }
   return behind;
 }
 
