@@ -4,7 +4,7 @@ _tendril() {
   local word=${COMP_WORDS[COMP_CWORD]} last=${COMP_WORDS[COMP_CWORD-1]}
   case $last in
     -mode) COMPREPLY=($(compgen -W 'dynamic static' -- "$word"));;
-    -integrator) COMPREPLY=($(compgen -W 'euler bdf2 sdirk2 midpoint energy_momentum generalized_alpha' -- "$word"));;
+    -integrator) COMPREPLY=($(compgen -W 'euler bdf2 bdf3 sdirk2 sdirk23 sdirk33 midpoint symplectic2 energy_momentum generalized_alpha' -- "$word"));;
     -dt_adapt) COMPREPLY=($(compgen -W 'none error' -- "$word"));;
     -continuation) COMPREPLY=($(compgen -W 'load arclength' -- "$word"));;
     -bifurcation) COMPREPLY=($(compgen -W 'off locate stop' -- "$word"));;

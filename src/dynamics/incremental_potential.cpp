@@ -404,7 +404,7 @@ IncrementalPotential::Residual IncrementalPotential::residual() {
   return worst;
 }
 
-[[gnu::flatten]] StageRates IncrementalPotential::stageRates(const StageRule &rule, bool with_strains) const {
+[[gnu::flatten]] StageRates IncrementalPotential::stageRates(const StageRule &rule) const {
   StageRates rates;
   for (Rates *part : {&rates.displacement, &rates.velocity, &rates.acceleration}) {
     part->vertex.resize(elements_.vertices());
@@ -430,13 +430,13 @@ IncrementalPotential::Residual IncrementalPotential::residual() {
       }
     }
   }
-  if (with_strains) rates.strains = strainsOf(elements_, iterate_);
   return rates;
 }
 
-/// An edge at the start, in the middle and at the end lies in one plane, so that the minimal rotations of the two halves make up that of the whole
-/// step: its spin over the step is twice that over its half, with no holonomy between.
-bool IncrementalPotential::moveOn(double time) {
+/// From the middle of a step an edge at the start, in the middle and at the end lies in one plane, so that the minimal rotations of the two halves make up
+/// that of the whole step: its spin over the step is twice that over its half, with no holonomy between. Where the guess goes along a curve, the spin is
+/// measured from the frames carried along it, by a second move.
+bool IncrementalPotential::moveOn(double time, const StageRule &end) {
   Planes increment = dofs_.makePlanes();
   Configuration trial;
   const double middle = step_.time;
@@ -444,10 +444,11 @@ bool IncrementalPotential::moveOn(double time) {
   turnSupports(iterate_, middle);
   for (int r = 0; r < all().end; ++r) {
     const RodRange &rod = elements_.rods[r];
-    for (int i = 0; i < rod.vertices; ++i) increment.setVector(0, rod.slot(i), iterate_.displacementAt(rod.slot(i), start_));
+    for (int i = 0; i < rod.vertices; ++i)
+      increment.setVector(0, rod.slot(i), end.guess.atVertex(rod.first_vertex + i) - iterate_.displacementAt(rod.slot(i), start_));
     for (int i = 0; rod.twist && i < rod.edges; i += lanes) {
       const Pack spun = spinOver(twistReference(), iterate_, rod.slot(i));
-      for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) increment[3][rod.slot(i + l)] = spun[l];
+      for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) increment[3][rod.slot(i + l)] = end.guess.atEdge(rod.first_edge + i + l) - spun[l];
     }
     dofs_.copyBehindRing(rod, increment);
   }
@@ -457,6 +458,17 @@ bool IncrementalPotential::moveOn(double time) {
     if (!tryMove(increment, 1, r, RetractionKind::additive, trial)) return false;
     accept(trial, r);
     const RodRange &rod = elements_.rods[r];
+    if (rod.twist && !end.halfway.empty()) {
+      carryFrames(end, elements_, r, start_, reference_);
+      for (int i = 0; i < rod.vertices; ++i) increment.setVector(0, rod.slot(i), Vec3::Zero());
+      for (int i = 0; i < rod.edges; i += lanes) {
+        const Pack spun = spinOver(reference_, iterate_, rod.slot(i));
+        for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) increment[3][rod.slot(i + l)] = end.guess.atEdge(rod.first_edge + i + l) - spun[l];
+      }
+      dofs_.copyBehindRing(rod, increment);
+      if (!tryMove(increment, 1, r, RetractionKind::additive, trial)) return false;
+      accept(trial, r);
+    }
     for (int s = rod.first_slot; s < rod.edgeEnd(); ++s) iterate_[C::axial_force][s] = elements_.axialStiffness()[s] * iterate_[C::strain][s];
   }
   return !beyond_barrier_;

@@ -127,18 +127,27 @@ void setSupports(const Scene &scene, const Elements &elements, double motion_tim
 void carryFrames(const StageRule &rule, const Elements &elements, int r, const Configuration &from, Configuration &reference) {
   const RodRange &rod = elements.rods[r];
   reference.copyRod(elements, r, from);
-  auto moved = [&](int i) {
+  auto moved = [&](const Combination &by, int i) {
     const int v = rod.first_vertex + (i == rod.vertices ? 0 : i);
-    return Vec3(elements.freedom()[elements.vertex_slot[v]] * rule.guess.atVertex(v));
+    return Vec3(elements.freedom()[elements.vertex_slot[v]] * by.atVertex(v));
   };
-  Vec3 here = moved(0);
+  Vec3 here = moved(rule.guess, 0);
   for (int i = 0; rod.twist && i < rod.edges; ++i) {
     const Frame f = from.frameAt(rod.slot(i));
-    const Vec3 next = moved(i + 1), edge = f.tangent * f.length + (next - here);
+    const Vec3 next = moved(rule.guess, i + 1), edge = f.tangent * f.length + (next - here);
     const Vec3 tangent = edge.normalized();
-    if (f.tangent.dot(tangent) > 0.1)
-      reference.setFrame(rod.slot(i), {tangent, orthonormalised(transport<double>(f.director, f.tangent, tangent), tangent), f.length});
     here = next;
+    if (!(f.tangent.dot(tangent) > 0.1)) continue;
+    Vec3 director = orthonormalised(transport<double>(f.director, f.tangent, tangent), tangent);
+    if (!rule.halfway.empty()) {
+      const Vec3 middle = (f.tangent * f.length + (moved(rule.halfway, i + 1) - moved(rule.halfway, i))).normalized();
+      if (middle.dot(f.tangent) > 0.1 && middle.dot(tangent) > 0.1) {
+        const Vec3 by_way = transport<double>(transport<double>(f.director, f.tangent, middle), middle, tangent);
+        const double triangle = halfAngleBetween<double>({tangent, director, 1.0}, {tangent, orthonormalised(by_way, tangent), 1.0}).angle();
+        director = rotateAbout<double>(director, tangent, 4.0 / 3 * triangle);
+      }
+    }
+    reference.setFrame(rod.slot(i), {tangent, director, f.length});
   }
 }
 

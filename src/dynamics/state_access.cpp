@@ -132,7 +132,7 @@ void RodAccess::setTurns(State &next, std::vector<double> twists, const std::vec
 void RodAccess::accept(State &&next) {
   next.memory.clear();
   next.strains.clear();
-  next.last_dt = 0;
+  next.last_dt = next.dt_before = 0;
   if (!dynamic_) next.time = 0;
   state_ = std::move(next);
 }

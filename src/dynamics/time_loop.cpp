@@ -36,28 +36,32 @@ PetscErrorCode TimeLoop::solveStages(const State &start, const Step &step, Newto
   PetscFunctionBeginUser;
   IncrementalPotential &potential = solver_.potential();
   const bool dissipates = potential.scene().stiffnessDissipates();
-  const int count = integrator_->stages(start);
   stages_.clear();
-  stages_.reserve(count);
-  for (int k = 0; k < count; ++k) {
-    const StageRule rule = integrator_->stage(start, step.dt, stages_);
+  for (bool more = true; more;) {
+    StageRule rule = integrator_->stage(start, step.dt, stages_);
     Step stage = step;
     stage.dt = rule.dt;
     stage.rule = integrator_->leavesChords() ? nullptr : &rule;
     if (rule.fraction != 1) stage.time = start.time + rule.fraction * step.dt;
+    std::vector<double> behind;
+    if (dissipates && rule.tangent_rates) behind = strainsBehind(solver_, start, stage);
+    if (!behind.empty()) rule.damping_past = {{-1, behind.data()}};
     NewtonReport one;
     PetscCall(solver_.solve(start, stage, &one));
+    const int iterations = one.iterations;
     one.iterations += report->iterations; // stages follow each other; blocks of rods do not
     report->include(one);
     report->converged = one.converged;
     report->reason = one.reason;
     report->negative_pivots = one.negative_pivots;
     if (!one.converged) PetscFunctionReturn(0);
-    stages_.push_back(potential.stageRates(rule, dissipates && (k + 1 < count || !integrator_->endsAtStage())));
+    stages_.push_back(potential.stageRates(rule));
+    more = integrator_->goesOn(start, stages_, iterations);
+    if (dissipates && (more || !integrator_->endsAtStage())) stages_.back().strains = strainsOf(potential.elements(), potential.iterate());
   }
-  if (!integrator_->endsAtStage() && !potential.moveOn(step.time)) {
+  if (!integrator_->endsAtStage() && !potential.moveOn(step.time, integrator_->end(start, step.dt, stages_))) {
     report->converged = false;
-    report->reason = "the end of the step, as far beyond its middle, is not a possible configuration";
+    report->reason = "the end of the step, beyond its last stage, is not a possible configuration";
   }
   PetscFunctionReturn(0);
 }
@@ -66,13 +70,18 @@ PetscErrorCode TimeLoop::solveStages(const State &start, const Step &step, Newto
 void TimeLoop::finishStages(State &state, double h) {
   const IncrementalPotential &potential = solver_.potential();
   const Scene &scene = potential.scene();
-  const bool keeps = integrator_->remembersStrains() && scene.stiffnessDissipates();
-  if (keeps) state.strains = strainsOf(potential.elements(), potential.start());
+  const bool keeps = integrator_->remembersStrains() > 0 && scene.stiffnessDissipates();
+  if (keeps) {
+    std::vector<double> before = strainsOf(potential.elements(), potential.start());
+    if (integrator_->remembersStrains() > 1)
+      before.insert(before.end(), state.strains.begin(), state.strains.begin() + std::min(before.size(), state.strains.size()));
+    state.strains = std::move(before);
+  }
   if (keeps && !integrator_->endsAtStage()) // as far beyond the middle
     std::transform(state.strains.begin(), state.strains.end(), stages_.back().strains.begin(), state.strains.begin(),
                    [](double start, double middle) { return 2 * middle - start; });
   integrator_->finish(state, h, stages_);
-  if (!state.memory.empty()) state.last_dt = h;
+  if (!state.memory.empty()) state.dt_before = std::exchange(state.last_dt, h);
   if (integrator_->leavesChords()) return; // of held vertices, too
   for (const Support &support : scene.supports) {
     if (!support.holdsPosition()) continue;

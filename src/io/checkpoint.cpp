@@ -44,7 +44,7 @@ void writeCheckpoint(const std::string &path, const State &state, const StepCont
     }
     if (!state.strains.empty()) file.write("strains", {state.strains.size()}, state.strains.data());
     const double loop[] = {state.time,    double(state.step), control.dt,    double(control.good), double(control.stable),
-                           control.error, control.error_sum,  state.last_dt, code(integrator),     control.rounding_sum};
+                           control.error, control.error_sum,  state.last_dt, code(integrator),     control.rounding_sum, state.dt_before};
     file.write("loop", {std::size(loop)}, loop);
   }
   std::error_code error;
@@ -62,15 +62,16 @@ void readCheckpoint(const std::string &path, State *state, StepControl *control,
     std::copy(read.begin(), read.end(), reinterpret_cast<double *>(values.data()));
   });
   const std::vector<double> loop = file.read("loop", 1);
-  if (loop.size() != 10) throw SceneError(path + ": 'loop' is not that of a checkpoint");
+  if (loop.size() != 10 && loop.size() != 11) throw SceneError(path + ": 'loop' is not that of a checkpoint");
   state->time = loop[0];
   state->step = std::int64_t(loop[1]);
   *control = {loop[2], int(loop[3]), loop[4] != 0, loop[5], loop[6], loop[9]};
   state->memory.clear();
   state->strains.clear();
-  state->last_dt = 0;
+  state->last_dt = state->dt_before = 0;
   if (loop[8] != code(integrator)) return; // what another method remembers is of no use: this one begins anew
   state->last_dt = loop[7];
+  if (loop.size() > 10) state->dt_before = loop[10]; // files of before there was bdf3 have none
   auto readInto = [&](const std::string &name, auto &values, std::size_t size, hsize_t columns) {
     const std::vector<double> read = file.read(name, columns);
     if (read.size() != size * columns) throw SceneError(path + ": '" + name + "' does not fit the scene; restart with the scene that wrote the checkpoint");

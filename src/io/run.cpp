@@ -244,6 +244,10 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, int *exi
   const std::string checkpoint = o.output_dir + "/checkpoint.h5";
   long steps = 0, iterations = 0, rejected = 0;
   bool warned = false;
+  // Without couples, forces and motions nothing puts energy in: where it rises by a part of the motion's own, the method does. Weight is a potential.
+  const bool closed = o.loop.dynamic && run.scene.forces.empty() && run.scene.moments.empty() && run.scene.rotation.angular_velocity.isZero(0) &&
+                      std::none_of(run.scene.supports.begin(), run.scene.supports.end(), [](const Support &s) { return s.motion.moves(); });
+  double dissipated = 0, gained = 0, most_kinetic = 0;
   const bool arclength = !o.loop.dynamic && o.loop.continuation == Continuation::arclength;
   auto observe = [&](const State &state, const Diagnostics &row) -> PetscErrorCode {
     PetscFunctionBeginUser;
@@ -263,6 +267,9 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, int *exi
       writeCheckpoint(checkpoint, state, loop.control, o.loop.integrator.name);
     }
     progress.step(row);
+    dissipated += row.dissipated;
+    most_kinetic = std::max(most_kinetic, row.energy.kinetic);
+    gained = std::max(gained, -dissipated);
     if (!o.loop.dynamic && row.negative_pivots > 0 && !warned) {
       progress.say("warning: " + std::to_string(row.negative_pivots) +
                    " negative pivots at an accepted state with couples: couples have no potential, so its stability is not known");
@@ -304,6 +311,13 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, int *exi
   summary << steps << " steps, " << iterations << " Newton iterations (mean " << std::setprecision(3) << (steps ? double(iterations) / double(steps) : 0)
           << "), " << rejected << " rejected, " << last.wall_seconds << " s, results in " << o.output_dir;
   progress.say(summary.str());
+  if (closed && gained > 0.1 * most_kinetic) {
+    std::ostringstream growth;
+    growth << "warning: the energy rose by " << std::setprecision(2) << gained / most_kinetic
+           << " of the largest kinetic energy, with nothing to put it in but -integrator " << o.loop.integrator.name
+           << " in steps too long for it: shorten -dt, or take bdf2 or energy_momentum";
+    progress.say(growth.str());
+  }
   if (last.rounding_error > 0) {
     std::ostringstream rounding;
     rounding << "rounding error: " << std::setprecision(2) << last.rounding_error << " of the rod length" << (o.loop.dynamic ? ", summed over the steps" : "");

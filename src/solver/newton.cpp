@@ -578,7 +578,7 @@ void NewtonSolver::predict(const State &start) {
   const StageRule *rule = potential_->step().rule;
   const Combination guess = rule ? rule->guess : Combination().add(potential_->step().dt, start);
   // Backward Euler's velocities are the last step's chords; others are tangents of the motion, and say nothing of lengths at that accuracy.
-  const RetractionKind along = rule ? RetractionKind::kept : RetractionKind::continued;
+  const RetractionKind along = rule && rule->half ? RetractionKind::additive : rule ? RetractionKind::kept : RetractionKind::continued;
   const RetractionKind kind = potential_->retraction == RetractionKind::length ? along : potential_->retraction;
   for (int r = rods_.begin; r < rods_.end; ++r) {
     const RodRange &rod = dofs.rods()[r];
@@ -589,6 +589,7 @@ void NewtonSolver::predict(const State &start) {
     const IncrementalPotential::RodEnergy energy = potential_->rodEnergy(work_->trial, r);
     if (!(energy.value < energyAtIterate(r).value)) continue;
     potential_->accept(work_->trial, r);
+    if (along == RetractionKind::additive) potential_->resetAxialForces(r);
     work_->energy[r] = energy;
     work_->energy_known[r] = potential_->scene().moments.empty();
   }

@@ -135,7 +135,7 @@ rows = [
     ("mode misspelt", None, ["-mode", "dynamics"], ["-mode", "did you mean 'dynamic'"]),
     ("retraction unknown", None, ["-retraction", "none"], ["-retraction", "additive, length"]),
     ("hessian unknown", None, ["-hessian", "newton"], ["-hessian", "exact, gauss_newton"]),
-    ("integrator unknown", None, ["-integrator", "bdf3"], ["-integrator", "euler, bdf2, sdirk2, midpoint, energy_momentum, generalized_alpha", "bdf2"]),
+    ("integrator unknown", None, ["-integrator", "bdf4"], ["-integrator", "euler, bdf2, bdf3, sdirk2, sdirk23, sdirk33, midpoint, symplectic2, energy_momentum, generalized_alpha", "bdf2"]),
     ("integrator in statics", None, ["-mode", "static", "-integrator", "bdf2"], ["-integrator", "static"]),
     ("rho_inf too large", None, ["-integrator", "generalized_alpha", "-rho_inf", "2"], ["-rho_inf", "[0, 1]"]),
     ("rho_inf of another method", None, ["-rho_inf", "0.5"], ["-rho_inf", "generalized_alpha"]),

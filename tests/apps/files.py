@@ -105,7 +105,7 @@ with tempfile.TemporaryDirectory() as tmp:
 
     # A method that remembers steps before goes on to the same bits, too, with adapted steps and dissipation. They end at the times of output, so that
     # runs with other ends have the same ones.
-    for method in ("bdf2", "generalized_alpha", "midpoint", "energy_momentum"):
+    for method in ("bdf2", "bdf3", "sdirk33", "generalized_alpha", "midpoint", "energy_momentum"):
         out, interval = f"{tmp}/{method}", 0.05
         options = ["-integrator", method, "-dt_adapt", "error", "-dt_rtol", "1e-4", "-output_interval", str(interval)]
         options += ["-rod_stiffness_damping_coefficient", "1e-3"]

@@ -6,7 +6,20 @@
 namespace tendril::test {
 namespace {
 
-const std::vector<std::string> second_order{"bdf2", "sdirk2", "midpoint", "generalized_alpha", "energy_momentum"};
+/// All but euler.
+const std::vector<std::string> accurate{"bdf2", "bdf3", "sdirk2", "sdirk23", "sdirk33", "midpoint", "symplectic2", "generalized_alpha", "energy_momentum"};
+
+int orderOf(const std::string &name) {
+  IntegratorSettings settings;
+  settings.name = name;
+  return makeIntegrator(settings)->order();
+}
+/// Where axial waves are much faster than the step (docs/theory.md).
+int stiffOrderOf(const std::string &name, bool dissipates) {
+  if (name == "sdirk2") return 1;
+  if (name == "sdirk33") return dissipates ? 2 : 1;
+  return name == "sdirk23" && !dissipates ? 2 : orderOf(name);
+}
 
 LoopSettings with(const std::string &integrator, double dt, double t_end) {
   LoopSettings s = dynamics(dt, t_end);
@@ -91,25 +104,38 @@ double observedOrder(const std::string &integrator, double dt, double axial, dou
 
 /// Positions alone: without dissipation the directors carry twist waves of every length, some too fast for the steps. Terms of the next order are
 /// less than a tenth of the error: 0.15 of the order. On a rod that is as good as inextensible the start is not smooth, for the axial force jumps to
-/// that of the swing: 0.45. sdirk2 is a method of first order there (docs/theory.md).
+/// that of the swing: 0.45. Methods of third order are off the waves that they do not resolve in steps four times as long: 0.25. With bdf3 those waves grow.
 TEST(Integrator, HasItsOrder) {
   const Sharp sharp;
   EXPECT_NEAR(observedOrder("euler", 2.5e-3, 1e2, 0, false), 1, 0.1);
   EXPECT_NEAR(observedOrder("euler", 2.5e-3, 1e8, 0, false), 1, 0.1);
+<<<<<<< HEAD
   for (const std::string &name : second_order) {
     EXPECT_NEAR(observedOrder(name, 2.5e-3, 1e2, 0, false), 2, 0.15) << name;
     EXPECT_NEAR(observedOrder(name, 2.5e-3, 1e2, 0, false, Energy::classical), 2, 0.15) << name;
     EXPECT_NEAR(observedOrder(name, 1e-2, 1e8, 0, true), name == "sdirk2" ? 1 : 2, 0.45) << name;
+=======
+  for (const std::string &name : accurate) {
+    if (name == "bdf3") continue;
+    EXPECT_NEAR(observedOrder(name, orderOf(name) == 2 ? 2.5e-3 : 1e-2, 1e2, 0, false), orderOf(name), orderOf(name) == 2 ? 0.15 : 0.25) << name;
+    EXPECT_NEAR(observedOrder(name, 1e-2, 1e8, 0, true), stiffOrderOf(name, false), 0.45) << name;
+>>>>>>> integrators
   }
 }
 
 /// Dissipation smooths the motion: the order is clean.
 TEST(Integrator, KeepsItsOrderWithDissipationByStiffness) {
   const Sharp sharp;
+<<<<<<< HEAD
   for (const std::string &name : second_order) {
     EXPECT_NEAR(observedOrder(name, 5e-3, 1e2, 0.02, true), 2, 0.1) << name;
     EXPECT_NEAR(observedOrder(name, 5e-3, 1e2, 0.02, true, Energy::classical), 2, 0.1) << name;
     EXPECT_NEAR(observedOrder(name, 1e-2, 1e8, 0.02, true), name == "sdirk2" ? 1 : 2, 0.2) << name;
+=======
+  for (const std::string &name : accurate) {
+    EXPECT_NEAR(observedOrder(name, orderOf(name) == 2 ? 5e-3 : 1e-2, 1e2, 0.02, true), orderOf(name), 0.1) << name; // third order: errors above Newton's
+    EXPECT_NEAR(observedOrder(name, 1e-2, 1e8, 0.02, true), stiffOrderOf(name, true), 0.2) << name;
+>>>>>>> integrators
   }
 }
 
@@ -120,14 +146,14 @@ TEST(Integrator, KeepsItsOrderWithDissipationByMass) {
   scene.rods = {straightRod(8)};
   scene.rods[0].initial_velocity = Vec3(0.3, -1, 2);
   scene.rods[0].material.mass_damping_coefficient = 3;
-  for (const std::string &name : second_order) {
+  for (const std::string &name : accurate) {
     double errors[2];
     for (int k = 0; k < 2; ++k) {
       Simulation sim;
       runTo(sim, scene, with(name, 0.04 / (1 << k), 0.8));
       errors[k] = (sim.state.velocity[3] - scene.rods[0].initial_velocity * std::exp(-3 * 0.8)).norm();
     }
-    EXPECT_NEAR(order(errors[0], errors[1]), 2, 0.15) << name; // next order: alpha h = 0.1
+    EXPECT_NEAR(order(errors[0], errors[1]), orderOf(name), 0.15) << name; // next order: alpha h = 0.1
   }
 }
 
@@ -143,14 +169,14 @@ State patternOfSteps(Simulation &sim, const std::string &integrator, double dt, 
 
 TEST(Integrator, KeepsItsOrderWithStepsThatVary) {
   const Sharp sharp;
-  for (const std::string &name : second_order) {
+  for (const std::string &name : accurate) {
     State s[4];
     for (int k = 0; k < 4; ++k) {
       Simulation sim;
       start(sim, with(name, 1, 1), swingScene(1e2, 0.02));
       s[k] = patternOfSteps(sim, name, 4e-3 / (1 << k), 0.448); // 16, 32, 64, 128 patterns
     }
-    EXPECT_NEAR(0.5 * order(apart(s[0], s[1]), apart(s[2], s[3])), 2, 0.2) << name;
+    EXPECT_NEAR(0.5 * order(apart(s[0], s[1]), apart(s[2], s[3])), orderOf(name), 0.2) << name;
   }
 }
 
@@ -161,7 +187,7 @@ TEST(FreeFall, IsExactInSecondOrder) {
   scene.gravity = Vec3(0, -9.81, 2);
   scene.rods = {straightRod(10)};
   scene.rods[0].initial_velocity = Vec3(1, 2, 0);
-  for (const std::string &name : second_order) {
+  for (const std::string &name : accurate) {
     Simulation sim;
     EXPECT_PETSC(sim.setUp(scene, with(name, 1, 1)));
     const State s = patternOfSteps(sim, name, 0.01, 0.7);
@@ -175,6 +201,7 @@ struct Flight {
   double momentum = 0, angular = 0;                                ///< largest change, relative
 };
 
+<<<<<<< HEAD
 /// A free rod that spins about its middle and bends, in a plane.
 Flight fly(const std::string &integrator, double dt, int steps, Energy energy) {
   Scene scene;
@@ -182,13 +209,16 @@ Flight fly(const std::string &integrator, double dt, int steps, Energy energy) {
   scene.rods = {straightRod(16)};
   scene.rods[0].material.axial_stiffness = 1e3;
   scene.rods[0].energy = energy;
+=======
+/// A free rod, thrown with velocities that depend on places.
+Flight fly(const Rod &rod, const std::function<Vec3(const Vec3 &)> &thrown, const std::string &integrator, double dt, int steps) {
+  Scene scene;
+  scene.gravity = Vec3::Zero();
+  scene.rods = {rod};
+>>>>>>> integrators
   Simulation sim;
   EXPECT_EQ(sim.setUp(scene, with(integrator, dt, dt * steps)), PetscErrorCode(0));
-  const std::vector<Vec3> &x = sim.state.position;
-  for (std::size_t v = 0; v < x.size(); ++v) {
-    const double s = x[v][0] - 0.5;
-    sim.state.velocity[v] = Vec3(1, 4 * s + 6 * (s * s - 1.0 / 12), 0);
-  }
+  std::transform(sim.state.position.begin(), sim.state.position.end(), sim.state.velocity.begin(), thrown);
   auto momenta = [&](const State &state) {
     std::pair<Vec3, Vec3> p{Vec3::Zero(), Vec3::Zero()};
     for (std::size_t v = 0; v < state.position.size(); ++v) {
@@ -220,9 +250,18 @@ Flight fly(const std::string &integrator, double dt, int steps, Energy energy) {
   return flight;
 }
 
+/// One that spins about its middle and bends, in a plane.
+Flight fly(const std::string &integrator, double dt, int steps) {
+  Rod rod = straightRod(16);
+  rod.material.axial_stiffness = 1e3;
+  return fly(
+      rod, [](const Vec3 &x) { return Vec3(1, 4 * (x[0] - 0.5) + 6 * (std::pow(x[0] - 0.5, 2) - 1.0 / 12), 0); }, integrator, dt, steps);
+}
+
 /// A thousand steps, forty periods of the first bending mode, which a step cuts in 28.
 TEST(FreeFlight, KeepsWhatEachMethodPromises) {
   const Sharp sharp;
+<<<<<<< HEAD
   for (const Energy energy : {Energy::seed, Energy::classical}) {
     std::map<std::string, Flight> flights;
     for (const std::string &name : integratorNames()) {
@@ -239,6 +278,43 @@ TEST(FreeFlight, KeepsWhatEachMethodPromises) {
       EXPECT_GT(flights[name].energy_end, flights["euler"].energy_end) << name;
       EXPECT_LT(flights[name].angular, flights["euler"].angular) << name;
     }
+=======
+  std::map<std::string, Flight> flights;
+  for (const std::string &name : integratorNames()) {
+    if (name == "bdf3") continue; // what is not damped grows
+    flights[name] = fly(name, 1e-2, 1000);
+    EXPECT_LT(flights[name].momentum, 1e-9) << name; // forces add up to nothing
+    EXPECT_LT(flights[name].energy_most, 1.01) << name;
+  }
+  for (const char *name : {"midpoint", "symplectic2"}) EXPECT_GT(flights[name].energy_least, 0.99) << name;
+  for (const char *name : {"midpoint", "symplectic2", "energy_momentum"}) EXPECT_LT(flights[name].angular, 1e-9) << name; // quadratic in the motion
+  EXPECT_GT(flights["energy_momentum"].energy_least, 0.99);
+  EXPECT_LT(flights["euler"].energy_end, 0.8);
+  EXPECT_GT(flights["generalized_alpha"].energy_end, 0.99);
+  for (const char *name : {"bdf2", "sdirk2", "sdirk23", "sdirk33"}) { // dissipation of third order
+    EXPECT_GT(flights[name].energy_end, flights["euler"].energy_end) << name;
+    EXPECT_LT(flights[name].angular, flights["euler"].angular) << name;
+>>>>>>> integrators
+  }
+}
+
+/// A rod that is straight by nature, drawn as an arc of 60 degrees, spins at 4 rad/s in its plane and a little out of it, and vibrates strongly: 140 steps in
+/// the first period, and from 0.2 down to 0.002 in that of the stiffest motion. 71 periods; 1 % of the energy is asked for.
+TEST(FreeFlight, KeepsItsEnergyByEnergyMomentumHoweverStiff) {
+  std::vector<Vec3> arc;
+  for (int i = 0; i <= 20; ++i) arc.push_back(3 / pi * Vec3(std::cos(pi / 3 * i / 20), std::sin(pi / 3 * i / 20), 0));
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3 &x : arc) middle += x / 21;
+  Rod rod = inextensibleRod(arc, Measure::angle);
+  rod.natural = Rod::Natural::given;
+  rod.material.linear_rotational_inertia = 0;
+  for (const double axial : {1e4, 1e6, 1e8}) {
+    rod.material.axial_stiffness = axial;
+    const Flight flight = fly(
+        rod, [&](const Vec3 &x) { return Vec3(Vec3(1, 0, 0) + Vec3(0.5, 0, 4).cross(x - middle)); }, "energy_momentum", 2e-3, 10000);
+    EXPECT_GT(flight.energy_least, 0.99) << axial;
+    EXPECT_LT(flight.energy_most, 1.01) << axial;
+    EXPECT_LT(flight.angular, 1e-6) << axial; // Newton's tolerance, 10 000 times
   }
 }
 
@@ -315,7 +391,7 @@ TEST(SpringPendulum, KeepsItsEnergyByEnergyMomentum) {
 
 TEST(Integrator, FollowsSupportsThatMove) {
   State first;
-  for (const std::string &name : second_order) {
+  for (const std::string &name : accurate) {
     Scene scene = swingScene(1e3, 0.1);
     Motion &motion = scene.supports[0].motion;
     motion.velocity = Vec3(0.5, 1, 0);
@@ -423,15 +499,15 @@ TEST(Adaptation, TakesShortSteps) {
       fixed.dt_min = dt / 2;
       const Outcome run = outcome(fixed);
       EXPECT_EQ(run.rejected, 0) << name << " " << dt;
-      EXPECT_LE(run.iterations, 4 * run.steps) << name << " " << dt; // two stages
+      EXPECT_LE(run.iterations, (orderOf(name) == 3 ? 6 : 4) * run.steps) << name << " " << dt; // of up to three stages, or two
     }
   }
 }
 
-/// On a stiff rod Newton takes about as many iterations as on a soft one; midpoint, whose axial forces swing from step to step, more than twice as many, and
-/// energy_momentum, whose forces swing less, half as many again.
+/// On a stiff rod Newton takes about as many iterations as on a soft one; methods whose axial forces swing from step to step, up to two and a half times as
+/// many: midpoint, symplectic2, and sdirk23, which damps them slowly; energy_momentum up to five solves instead of three.
 TEST(Integrator, IterationsDoNotGrowWithTheAxialStiffness) {
-  const std::map<std::string, double> most{{"midpoint", 2.5}, {"energy_momentum", 1.6}};
+  const std::map<std::string, double> most{{"midpoint", 2.5}, {"symplectic2", 2.5}, {"sdirk23", 2.5}, {"energy_momentum", 2}};
   for (const std::string &name : integratorNames())
     for (const double axial : {1e8, 1e12})
       EXPECT_LE(swing(with(name, 0.01, 0.4), axial).iterations, (most.count(name) ? most.at(name) : 1.2) * swing(with(name, 0.01, 0.4), 1e4).iterations)
@@ -441,8 +517,9 @@ TEST(Integrator, IterationsDoNotGrowWithTheAxialStiffness) {
 /// The released cantilever against a Legendre-Galerkin solution (data/reference), at 5 ms: the figures are those measured with 50 edges, with a margin of a
 /// half.
 TEST(Integrator, FollowsTheReleasedCantilever) {
-  const std::map<std::string, double> largest{{"euler", 0.1},           {"bdf2", 8e-3}, {"sdirk2", 5e-3}, {"midpoint", 5e-3}, {"generalized_alpha", 5e-3},
-                                              {"energy_momentum", 5e-3}};
+  const std::map<std::string, double> largest{
+      {"euler", 0.1},     {"bdf2", 8e-3},        {"sdirk2", 5e-3},          {"sdirk23", 5e-3},          {"sdirk33", 5e-3},
+      {"midpoint", 5e-3}, {"symplectic2", 5e-3}, {"energy_momentum", 5e-3}, {"generalized_alpha", 5e-3}};
   Rod rod = straightRod(50);
   rod.material = homogeneousMaterial({SectionShape::circle, {0.005, 0}}, 1e7, 1e7 / 3, 1200);
   for (const auto &[name, bound] : largest) {

@@ -93,15 +93,15 @@ public:
   /// The largest of each over all rods.
   Residual residual();
 
-  /// Displacements of the iterate since the step began, and the rates that follow from them by a rule; strains when asked for.
-  StageRates stageRates(const StageRule &rule, bool with_strains) const;
+  /// Displacements of the iterate since the step began, and the rates that follow from them by a rule.
+  StageRates stageRates(const StageRule &rule) const;
   const Configuration &start() const { return start_; }
   double length(int rod) const { return length_[rod]; }         ///< at rest [m]
   double shortestEdge(int rod) const { return shortest_[rod]; } ///< at rest [m]
   double longestEdge(int rod) const { return longest_[rod]; }   ///< at rest [m]
-  /// From the middle of a step to its end at `time`: positions, spins and directors move on by as much again (supports to their places), axial
-  /// forces come from the strains. False when that leads to an impossible configuration.
-  bool moveOn(double time);
+  /// From the last stage of a step to its end at `time`: positions, spins and directors to where the guess of a rule leads (supports to their places),
+  /// axial forces come from the strains. False when that leads to an impossible configuration.
+  bool moveOn(double time, const StageRule &end);
 
   /// State of some rods after the step: positions, directors made orthonormal, axial forces; and the velocities of backward Euler.
   void commitConfiguration(State &state, RodSet rods) const;

@@ -14,17 +14,20 @@ public:
   using Stages = std::vector<StageRates>; ///< those of a step that are done
   virtual ~Integrator() = default;
   virtual int order() const { return 2; }
-  /// Stages of the step that follows a state.
+  /// Least number of stages of the step that follows a state.
   virtual int stages(const State & /*start*/) const { return 1; }
   /// Stage number done.size() of a step of length h [s].
   virtual StageRule stage(const State &start, double h, const Stages &done) const = 0;
-  /// Whether the last stage is the end of the step; else it is its middle.
+  /// Whether the step needs another stage after those done, of which the last took some iterations.
+  virtual bool goesOn(const State &start, const Stages &done, int /*iterations*/) const { return int(done.size()) < stages(start); }
+  /// Whether the last stage is the end of the step; else `end` has the displacements there, as `guess` and `halfway`.
   virtual bool endsAtStage() const { return true; }
+  virtual StageRule end(const State & /*start*/, double /*h*/, const Stages & /*done*/) const { return {}; }
   /// Whether the velocities of states are the chords of steps, that and nothing else, as backward Euler's are. Its steps need no rule, Newton starts where
   /// lengths go on as in the last step, and blocks of rods are committed as they converge.
   virtual bool leavesChords() const { return false; }
-  /// Whether State::strains is wanted, where stiffness dissipates.
-  virtual bool remembersStrains() const { return false; }
+  /// How many sets of State::strains are wanted, where stiffness dissipates.
+  virtual int remembersStrains() const { return 0; }
   /// Fills the memory of a state that has none; most methods begin without.
   virtual PetscErrorCode begin(StepSolver & /*solver*/, double /*h*/, State & /*state*/) const { return PetscErrorCode(0); }
   /// Local error of the displacements of a step, to leading order; empty where nothing is known yet.
@@ -35,6 +38,11 @@ public:
 
 /// Accelerations of a state from the forces on it. \param h about the length of a step [s]
 Rates startAcceleration(StepSolver &solver, double h, const State &state);
+
+/// Strains s0 for which (s - s0)/damping_dt is the rate that the velocities of a stage give the strains s: found at its guess, where s0 differs from that of
+/// the solution by second derivatives of the strains times what the guess is off. Empty where the guess is impossible. In differences of the stages' own
+/// strains the squares of motions leave an error of first order in the step, which does not matter to methods of second order whose last stage is the end.
+std::vector<double> strainsBehind(StepSolver &solver, const State &start, const Step &stage);
 
 struct IntegratorSettings {
   std::string name = "euler";
@@ -48,7 +56,11 @@ std::unique_ptr<Integrator> makeIntegrator(const IntegratorSettings &settings);
 
 std::unique_ptr<Integrator> makeEuler(const IntegratorSettings &);
 std::unique_ptr<Integrator> makeBdf2(const IntegratorSettings &);
+std::unique_ptr<Integrator> makeBdf3(const IntegratorSettings &);
 std::unique_ptr<Integrator> makeSdirk2(const IntegratorSettings &);
+std::unique_ptr<Integrator> makeSdirk23(const IntegratorSettings &);
+std::unique_ptr<Integrator> makeSdirk33(const IntegratorSettings &);
+std::unique_ptr<Integrator> makeSymplectic2(const IntegratorSettings &);
 std::unique_ptr<Integrator> makeMidpoint(const IntegratorSettings &);
 std::unique_ptr<Integrator> makeGeneralizedAlpha(const IntegratorSettings &);
 std::unique_ptr<Integrator> makeEnergyMomentum(const IntegratorSettings &);

@@ -27,8 +27,9 @@ struct State {
   std::vector<double> axial_force; ///< (ne) [N]
   std::vector<double> turns;       ///< (cells) 2 pi x whole turns of the twist angle, carried by continuity (`angle` measure) [rad]
   double last_dt = 0;              ///< length of the step that led here; 0 where the integrator remembers nothing [s]
+  double dt_before = 0;            ///< of the step before that; 0 where there was none [s]
   std::vector<Rates> memory;       ///< what the integrator remembers of steps before
-  std::vector<double> strains;     ///< before the last step, as strainsOf; where the integrator wants them
+  std::vector<double> strains;     ///< before the last step, as strainsOf, then before the one before; where the integrator wants them
 
   bool operator==(const State &) const = default;
 };

@@ -58,8 +58,10 @@ public:
 
 /// Strain around which dissipation by stiffness pulls: that at the start, with what the stage remembers.
 template <class T> T dampedRest(const Step &step, const T &start, std::size_t index) {
-  if (!step.rule || !step.rule->strains || step.rule->damping_memory == 0) return start;
-  return start + T(step.rule->damping_memory) * (start - read<T>(step.rule->strains->data() + index));
+  T rest = start;
+  if (step.rule)
+    for (const StageRule::PastStrains &past : step.rule->damping_past) rest += T(past.weight) * (start - read<T>(past.strains + index));
+  return rest;
 }
 
 /// Axial force of every edge as a linear law of its strain over one step: stiffness (strain - rest), dissipation included. Over slots.

@@ -11,7 +11,7 @@ public:
   explicit Bdf2(const IntegratorSettings &settings) : first_(makeSdirk2(settings)) {}
 
   int stages(const State &start) const override { return start.memory.empty() ? first_->stages(start) : 1; }
-  bool remembersStrains() const override { return true; }
+  int remembersStrains() const override { return 1; }
 
   StageRule stage(const State &start, double h, const Stages &done) const override {
     if (start.memory.empty()) return first_->stage(start, h, done);
@@ -21,9 +21,7 @@ public:
     rule.velocity.add(-c / w, start.memory[chord]);
     rule.acceleration.add(-1 - c / r, start).add(c / r, start.memory[velocity]);
     rule.guess.add(h * (1 + 0.5 * w), start).add(-0.5 * h * w, start.memory[velocity]);
-    if (start.strains.empty()) return rule;
-    rule.strains = &start.strains;
-    rule.damping_memory = c / r;
+    if (!start.strains.empty()) rule.damping_past = {{c / r, start.strains.data()}};
     return rule;
   }
 

@@ -14,7 +14,7 @@ public:
       : am_((2 * settings.rho_inf - 1) / (settings.rho_inf + 1)), af_(settings.rho_inf / (settings.rho_inf + 1)), c_(0.5 - am_ + af_),
         b_(0.25 * (1 - am_ + af_) * (1 - am_ + af_)) {}
 
-  bool remembersStrains() const override { return true; }
+  int remembersStrains() const override { return 1; }
 
   PetscErrorCode begin(StepSolver &solver, double h, State &state) const override {
     PetscFunctionBeginUser;
@@ -40,8 +40,7 @@ public:
     if (start.strains.empty()) return rule;
     const double w = h / start.last_dt;
     rule.damping_dt = h * (1 + w) / (1 + 2 * w);
-    rule.strains = &start.strains;
-    rule.damping_memory = w * w / (1 + 2 * w);
+    rule.damping_past = {{w * w / (1 + 2 * w), start.strains.data()}};
     return rule;
   }
 

@@ -13,10 +13,14 @@ struct Entry {
 constexpr Entry entries[] = {
     {"euler", "backward Euler, first order, most dissipative", makeEuler},
     {"bdf2", "second order, L-stable, keeps its order on stiff rods", makeBdf2},
+    {"bdf3", "third order, for motion that stiffness damps: what is not damped may grow", makeBdf3},
     {"sdirk2", "second order, L-stable, two solves a step, first order on stiff rods", makeSdirk2},
+    {"sdirk23", "third order, A-stable, two solves a step", makeSdirk23},
+    {"sdirk33", "third order, L-stable, three solves a step", makeSdirk33},
     {"midpoint", "second order, keeps the energy within a band, damps nothing", makeMidpoint},
     {"generalized_alpha", "second order, damps high frequencies by -rho_inf", makeGeneralizedAlpha},
-    {"energy_momentum", "midpoint that keeps the energy of stiff rods, too, two solves a step", makeEnergyMomentum},
+    {"symplectic2", "as midpoint, of two stages: half its step at twice its cost", makeSymplectic2},
+    {"energy_momentum", "midpoint that keeps the energy of stiff rods, too, two to five solves a step", makeEnergyMomentum},
 };
 
 } // namespace
@@ -47,8 +51,7 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
     if (possible) {
       before = strainsOf(elements, earlier);
       rest.damping_dt = moment;
-      rest.damping_memory = -1;
-      rest.strains = &before;
+      rest.damping_past = {{-1, before.data()}};
       solver.begin(state, step);
     }
   }
@@ -67,6 +70,49 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
     }
   }
   return a;
+}
+
+std::vector<double> strainsBehind(StepSolver &solver, const State &start, const Step &stage) {
+  IncrementalPotential &potential = solver.potential();
+  const Elements &elements = potential.elements();
+  const StageRule &rule = *stage.rule;
+  const double moment = 1e-3; // of damping_dt: long enough for the strains to change by more than their rounding, and its square is nothing
+  Planes moved = potential.dofs().makePlanes();
+  Configuration there;
+  auto at = [&](double later) { // supports, too
+    Step then = stage;
+    then.time += later;
+    solver.begin(start, then);
+    const double along = 1 + later / rule.dt;
+    for (const RodRange &rod : elements.rods) {
+      for (int i = 0; i < rod.vertices; ++i) {
+        const int v = rod.first_vertex + i;
+        moved.setVector(0, rod.slot(i), elements.freedom()[rod.slot(i)] * (along * rule.guess.atVertex(v) + later * rule.velocity.atVertex(v)));
+      }
+      for (int i = 0; rod.twist && i < rod.edges; ++i) {
+        const int e = rod.first_edge + i;
+        moved[3][rod.slot(i)] = along * rule.guess.atEdge(e) + later * rule.velocity.atEdge(e);
+      }
+      potential.dofs().copyBehindRing(rod, moved);
+    }
+    potential.remainingMotion(potential.all(), moved);
+    for (int r = 0; r < potential.all().end; ++r)
+      if (!potential.tryMove(moved, 1, r, RetractionKind::additive, there)) return std::vector<double>();
+    return strainsOf(elements, there);
+  };
+  std::vector<double> behind = at(0);
+  const std::vector<double> before = at(-moment * rule.damping_dt), after = at(moment * rule.damping_dt);
+  if (behind.empty() || before.empty() || after.empty()) return {};
+  // Differences of the stages' strains instead where both are far apart: there the solution is far from the guess.
+  constexpr double far = 0.05; // [rad]
+  const std::vector<double> first = strainsOf(elements, potential.start());
+  for (std::size_t k = 0; k < behind.size(); ++k) {
+    double difference = first[k];
+    for (const StageRule::PastStrains &past : rule.damping_past) difference += past.weight * (first[k] - past.strains[k]);
+    behind[k] -= (after[k] - before[k]) / (2 * moment);
+    if (!(std::abs(behind[k] - difference) < far)) behind[k] = difference;
+  }
+  return behind;
 }
 
 std::vector<std::string> integratorNames() {

@@ -2,8 +2,9 @@
 /// is quadratic in the motion; the energy stays within a band. Nothing damps stiff motions.
 /// With the axial force of an edge from the mean S of its strains at both ends of the step instead of its strain in the middle, what it does over the step is
 /// what the edge stores: strains are quadratic in positions, so that their change is B(middle) times the displacement (Simo, Tarnow and Doblare 1995). But
-/// S B(middle) is no gradient: d S = (m + de)/L^2, while the force points along the middle's edge m. So a step solves twice: first for the middle, then with
-/// |de|^2/(2 L^2), what the mean has on top of the strain in the middle, as the first solve found it. Each is a potential with forces along m.
+/// S B(middle) is no gradient: d S = (m + de)/L^2, while the force points along the middle's edge m. So a step solves first for the middle, then with
+/// |de|^2/(2 L^2), what the mean has on top of the strain in the middle, as the solve before found it, until one iteration of Newton's method is enough. Each
+/// is a potential with forces along m.
 #include "tendril/dynamics/integrator.hpp"
 
 namespace tendril {
@@ -11,11 +12,14 @@ namespace {
 
 class Midpoint final : public Integrator {
 public:
-  explicit Midpoint(int solves) : solves_(solves) {}
+  explicit Midpoint(int most) : most_(most) {}
 
-  int stages(const State &) const override { return solves_; }
+  int stages(const State &) const override { return std::min(most_, 2); }
+  bool goesOn(const State &start, const Stages &done, int iterations) const override {
+    return int(done.size()) < stages(start) || (iterations > 1 && int(done.size()) < most_);
+  }
   bool endsAtStage() const override { return false; }
-  bool remembersStrains() const override { return true; }
+  int remembersStrains() const override { return 1; }
 
   PetscErrorCode begin(StepSolver &solver, double h, State &state) const override {
     PetscFunctionBeginUser;
@@ -37,9 +41,14 @@ public:
     if (start.strains.empty()) return rule;
     // Along the chord from the start to the middle strains change with the square of the motion, too, of which the rate in the middle has twice as
     // much: what is missing was, in the last step, half of the difference between the strain at its end and that as far beyond its middle.
-    rule.damping_memory = -0.5 * std::pow(h / start.last_dt, 2);
-    rule.strains = &start.strains;
+    rule.damping_past = {{-0.5 * std::pow(h / start.last_dt, 2), start.strains.data()}};
     return rule;
+  }
+
+  StageRule end(const State &, double, const Stages &done) const override {
+    StageRule end;
+    end.guess.add(2, done.back().displacement);
+    return end;
   }
 
   /// h^3/12 x''', by the accelerations in the middles of this step and the last; of the first, in its middle and at its start.
@@ -55,12 +64,12 @@ public:
   }
 
 private:
-  int solves_;
+  int most_; ///< solves of a step
 };
 
 } // namespace
 
 std::unique_ptr<Integrator> makeMidpoint(const IntegratorSettings &) { return std::make_unique<Midpoint>(1); }
-std::unique_ptr<Integrator> makeEnergyMomentum(const IntegratorSettings &) { return std::make_unique<Midpoint>(2); }
+std::unique_ptr<Integrator> makeEnergyMomentum(const IntegratorSettings &) { return std::make_unique<Midpoint>(5); }
 
 } // namespace tendril
