@@ -6,6 +6,9 @@
 
 namespace tendril {
 
+/// Of the Hessian's eigenvalues, in units of the softest bending: keeps solves regular where a motion costs nothing, a turn about an axis, say.
+constexpr double lift = 1e-7;
+
 void requireDeadLoads(const Scene &scene) {
   for (const Support &support : scene.supports)
     if (support.motion.moves())
@@ -100,7 +103,7 @@ PetscErrorCode ArcLength::solve(const Planes &gradient, Planes *step) {
 /// Unit tangent of the path at the iterate, on the side of the last step.
 PetscErrorCode ArcLength::tangent(Point *direction) {
   PetscFunctionBeginUser;
-  PetscCall(solver_.inertiaAtIterate(&negative_));
+  PetscCall(solver_.inertiaAtIterate(&negative_, lift));
   if (negative_ < 0) obstacle_ = "the Hessian cannot be factored";
   direction->factor = 1;
   PetscCall(solveLoad(&direction->unknowns));
@@ -142,7 +145,7 @@ PetscErrorCode ArcLength::iterate(const std::function<double(const Point &moved,
     if (*converged) PetscFunctionReturn(0);
     if (k == most_iterations) break;
     int negative;
-    PetscCall(solver_.inertiaAtIterate(&negative));
+    PetscCall(solver_.inertiaAtIterate(&negative, lift));
     if (negative < 0) {
       obstacle_ = "the Hessian cannot be factored";
       PetscFunctionReturn(0);
