@@ -15,9 +15,16 @@ double distanceBetween(const State &a, const State &b) {
   return apart / (high - low).norm();
 }
 
+constexpr double sharp = 1e-11; // of the load
+
+bool SharpTolerance::isMet(const IncrementalPotential::Residual &residual) {
+  constexpr double enough = 100 * sharp;
+  return excess(residual, enough) <= 1 || isAtNoise(residual, enough);
+}
+
 SharpTolerance::SharpTolerance(StepSolver &solver) : solver_(solver) {
   (void)SNESGetTolerances(solver.snes(), nullptr, &before_, nullptr, nullptr, nullptr);
-  set(std::min(before_, 1e-11));
+  set(std::min(before_, sharp));
 }
 
 SharpTolerance::~SharpTolerance() { set(before_); }
@@ -47,6 +54,7 @@ static PetscErrorCode bisect(const Follow &follow, BranchPoint *low, double high
     if (middle <= low->parameter || middle >= high) break;
     BranchPoint point;
     PetscCall(follow(base, middle, &point));
+    if (!point.found && base.parameter != low->parameter) PetscCall(follow(*low, middle, &point)); // towards a limit point, the nearest start is best
     // What cannot be found counts as beyond: past a limit point there is nothing near to converge to.
     if (point.found && point.unstable == low->unstable) {
       *low = point;

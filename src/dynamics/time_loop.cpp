@@ -35,8 +35,8 @@ PetscErrorCode TimeLoop::locate(State &start, const Step &step, bool *moved) {
       there.time = there.load_factor = factor;
       NewtonReport report;
       PetscCall(solver_.solve(from.state, there, &report, Seek::equilibrium));
-      to->found = report.converged;
-      if (!report.converged) PetscFunctionReturn(0);
+      to->found = report.converged && SharpTolerance::isMet(report.residual);
+      if (!to->found) PetscFunctionReturn(0);
       PetscCall(countUnstable(solver_, &to->unstable));
       solver_.potential().commit(to->state);
       // Before a limit point a rod moves by the root of the interval; beyond it, Newton jumps.
@@ -237,7 +237,10 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     }
     // Couples have no potential: the inertia of the symmetric part says nothing about stability.
     const bool detects = !settings_.dynamic && settings_.bifurcation != Bifurcation::off && potential.scene().moments.empty();
-    if (detects && stable && report.first_negative_pivots > 0 && located_ <= state.time) {
+    // Newton may pass an unstable equilibrium and only meet indefinite Hessians. Who asks for a critical load has that looked into.
+    const bool asks = settings_.bifurcation == Bifurcation::stop || settings_.bifurcation == Bifurcation::switch_branch;
+    const bool passed = report.first_negative_pivots > 0 || (asks && report.shifts > 0 && state.time > 0);
+    if (detects && stable && passed && located_ <= state.time) {
       bool moved = false;
       PetscCall(locate(state, step, &moved));
       *finished = moved && settings_.bifurcation == Bifurcation::stop;

@@ -43,6 +43,8 @@ public:
   explicit SharpTolerance(StepSolver &solver);
   ~SharpTolerance();
   SharpTolerance(const SharpTolerance &) = delete;
+  /// Whether an answer is one by its forces: beside a limit point, where there is none, Newton's corrections may be little, too.
+  static bool isMet(const IncrementalPotential::Residual &residual);
 
 private:
   StepSolver &solver_;
