@@ -45,20 +45,20 @@ PetscErrorCode countUnstable(StepSolver &solver, int *unstable) {
   PetscFunctionReturn(0);
 }
 
-/// Bisection. Steps begin at the last point that is not within `aside` of the critical one, where the Hessian is nearly singular: Newton strays from there.
-static PetscErrorCode bisect(const Follow &follow, BranchPoint *low, double high, double interval, double aside) {
+/// Bisection. Steps begin at `base`, the last point that is not within `aside` of the critical one, where the Hessian is nearly singular and Newton strays.
+static PetscErrorCode bisect(const Follow &follow, BranchPoint *low, BranchPoint *base, double high, double interval, double aside) {
   PetscFunctionBeginUser;
-  BranchPoint base = *low;
+  *base = *low;
   while (high - low->parameter > interval) {
     const double middle = 0.5 * (low->parameter + high);
     if (middle <= low->parameter || middle >= high) break;
     BranchPoint point;
-    PetscCall(follow(base, middle, &point));
-    if (!point.found && base.parameter != low->parameter) PetscCall(follow(*low, middle, &point)); // towards a limit point, the nearest start is best
+    PetscCall(follow(*base, middle, &point));
+    if (!point.found && base->parameter != low->parameter) PetscCall(follow(*low, middle, &point)); // towards a limit point, the nearest start is best
     // What cannot be found counts as beyond: past a limit point there is nothing near to converge to.
     if (point.found && point.unstable == low->unstable) {
       *low = point;
-      if (high - middle > aside) base = point;
+      if (high - middle > aside) *base = point;
     } else
       high = middle;
   }
@@ -72,11 +72,12 @@ PetscErrorCode locateCritical(const Follow &follow, BranchPoint low, double high
   *found = false;
   const double end = high, aside = std::max(part * (high - low.parameter), 1e-5 * scale);
   double last = std::nan(""); // what the round before found
-  bool ahead = false; // whether the branch was found beyond
+  bool ahead = false;         // whether the branch was found beyond
   BranchPoint beyond;
   PetscCall(follow(low, end, &beyond));
   for (int round = 0; round < most_rounds && !(beyond.found && beyond.unstable == low.unstable); ++round) {
-    PetscCall(bisect(follow, &low, high, interval * scale, aside));
+    BranchPoint base, before;
+    PetscCall(bisect(follow, &low, &base, high, interval * scale, aside));
     if (std::abs(low.state.time - last) <= agreement * std::abs(last)) {
       *found = true;
       point->load_factor = low.state.time;
@@ -85,8 +86,7 @@ PetscErrorCode locateCritical(const Follow &follow, BranchPoint low, double high
       PetscFunctionReturn(0);
     }
     last = low.state.time;
-    BranchPoint before;
-    PetscCall(follow(low, low.parameter - aside, &before));
+    PetscCall(follow(base, low.parameter - aside, &before));
     if (!before.found || before.unstable != low.unstable) break; // no branch that leads here
     const double behind = std::min(low.parameter + aside, end);
     PetscCall(follow(before, behind, &beyond));
