@@ -351,6 +351,18 @@ TEST(CriticalFactor, AlongTheArcLengthIsThatOfLoadSteps) {
   EXPECT_EQ(stopped.end, *stopped.critical[0].state);
 }
 
+/// Load steps snap past it to a stable shape far off.
+TEST(CriticalFactor, OfALimitPointIsThatOfTheArcLength) {
+  const Path path = follow(deepArch(64, 1000), along(20, 30));
+  ASSERT_GE(path.critical.size(), 1u);
+  for (const int steps : {5, 10, 20, 80}) {
+    const Path load = follow(deepArch(64, 1000), stopping(steps));
+    ASSERT_EQ(load.critical.size(), 1u) << steps;
+    EXPECT_TRUE(load.critical[0].limit) << steps;
+    EXPECT_NEAR(load.critical[0].load_factor, path.critical[0].load_factor, step_tolerance) << steps;
+  }
+}
+
 /// A clamped column of length 1 is half of a pinned one of length 2: load P/4, tip at (1 - shortening, 2 ymax) of elastica_postbuckling.csv.
 double buckledTipError(int edges, double slope, LoopSettings settings) {
   auto exact = referenceRow("elastica_postbuckling.csv", slope);
