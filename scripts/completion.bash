@@ -7,7 +7,7 @@ _tendril() {
     -integrator) COMPREPLY=($(compgen -W 'euler bdf2 bdf3 sdirk2 sdirk23 sdirk33 midpoint symplectic2 energy_momentum generalized_alpha' -- "$word"));;
     -dt_adapt) COMPREPLY=($(compgen -W 'none error' -- "$word"));;
     -continuation) COMPREPLY=($(compgen -W 'load arclength' -- "$word"));;
-    -bifurcation) COMPREPLY=($(compgen -W 'off locate stop' -- "$word"));;
+    -bifurcation) COMPREPLY=($(compgen -W 'off locate stop switch' -- "$word"));;
     -stretch) COMPREPLY=($(compgen -W 'primal mixed' -- "$word"));;
     -retraction) COMPREPLY=($(compgen -W 'additive length' -- "$word"));;
     -hessian) COMPREPLY=($(compgen -W 'exact gauss_newton' -- "$word"));;

@@ -6,6 +6,9 @@
 
 namespace tendril {
 
+/// Of the Hessian's eigenvalues, in units of the softest bending: keeps solves regular where a motion costs nothing, a turn about an axis, say.
+constexpr double lift = 1e-7;
+
 void requireDeadLoads(const Scene &scene) {
   for (const Support &support : scene.supports)
     if (support.motion.moves())
@@ -100,7 +103,7 @@ PetscErrorCode ArcLength::solve(const Planes &gradient, Planes *step) {
 /// Unit tangent of the path at the iterate, on the side of the last step.
 PetscErrorCode ArcLength::tangent(Point *direction) {
   PetscFunctionBeginUser;
-  PetscCall(solver_.inertiaAtIterate(&negative_));
+  PetscCall(solver_.inertiaAtIterate(&negative_, lift));
   if (negative_ < 0) obstacle_ = "the Hessian cannot be factored";
   direction->factor = 1;
   PetscCall(solveLoad(&direction->unknowns));
@@ -142,7 +145,7 @@ PetscErrorCode ArcLength::iterate(const std::function<double(const Point &moved,
     if (*converged) PetscFunctionReturn(0);
     if (k == most_iterations) break;
     int negative;
-    PetscCall(solver_.inertiaAtIterate(&negative));
+    PetscCall(solver_.inertiaAtIterate(&negative, lift));
     if (negative < 0) {
       obstacle_ = "the Hessian cannot be factored";
       PetscFunctionReturn(0);
@@ -184,21 +187,29 @@ PetscErrorCode ArcLength::correctAt(double factor, bool *converged) {
   PetscFunctionReturn(0);
 }
 
-/// One step; the potential's iterate is its end when it converged.
-PetscErrorCode ArcLength::step(const State &state, double length, bool *converged) {
+/// Makes a state the start of a step, and the tangent of the path there.
+PetscErrorCode ArcLength::begin(const State &state, Point *direction) {
+  PetscFunctionBeginUser;
+  Step step;
+  step.time = step.load_factor = state.time;
+  step.mixed = settings_.mixed;
+  solver_.begin(state, step);
+  PetscCall(tangent(direction));
+  PetscFunctionReturn(0);
+}
+
+/// One step along the path, or `along` another direction; the potential's iterate is its end when it converged.
+PetscErrorCode ArcLength::step(const State &state, double length, bool *converged, const Point *along) {
   constexpr double straying = 1.5; // of the step's length, from tangent to chord below 48 degrees: beyond it may be another branch
   PetscFunctionBeginUser;
   *converged = false;
   iterations_ = 0;
   obstacle_.clear();
-  Step step;
-  step.time = step.load_factor = state.time;
-  step.mixed = settings_.mixed;
   IncrementalPotential &potential = solver_.potential();
-  solver_.begin(state, step);
   Point direction;
-  PetscCall(tangent(&direction));
+  PetscCall(begin(state, &direction));
   if (!obstacle_.empty()) PetscFunctionReturn(0);
+  if (along) direction = *along;
   Point predicted = direction;
   for (double &d : predicted.unknowns) d *= length;
   if (!move(predicted.unknowns, state.time + length * direction.factor)) {
@@ -221,12 +232,14 @@ PetscErrorCode ArcLength::step(const State &state, double length, bool *converge
 
 /// The point between the ends of a step where the load factor turns: false position (Illinois) on the slope of the load factor along the path,
 /// by steps of other lengths from the same start.
-PetscErrorCode ArcLength::locateLimit(const State &start, const Point &before, const std::array<double, 2> &slopes, double length) {
+PetscErrorCode ArcLength::locateLimit(const State &start, const Point &before, const std::array<double, 2> &slopes, double length,
+                                      std::optional<CriticalPoint> *located) {
   constexpr int most_steps = 20;
   constexpr double flat = 1e-4; // of the slope at the start: the load factor is off by its square
   PetscFunctionBeginUser;
   const Point after = std::exchange(last_, before);
   const int iterations = iterations_, negative = negative_;
+  const SharpTolerance sharp(solver_);
   std::array<double, 2> ends{0, length}, values = slopes;
   CriticalPoint point;
   point.limit = true;
@@ -253,7 +266,62 @@ PetscErrorCode ArcLength::locateLimit(const State &start, const Point &before, c
   last_ = after;
   iterations_ = iterations;
   negative_ = negative;
-  if (point.state && on_critical) PetscCall(on_critical(point));
+  if (point.state) *located = point;
+  PetscFunctionReturn(0);
+}
+
+/// The point between the ends of a step where the count of unstable motions changes while the load factor does not turn.
+PetscErrorCode ArcLength::locateBifurcation(const State &start, const Point &before, double length, std::optional<CriticalPoint> *located) {
+  PetscFunctionBeginUser;
+  const Point after = std::exchange(last_, before);
+  const int iterations = iterations_, negative = negative_;
+  const SharpTolerance sharp(solver_);
+  auto follow = [&](const BranchPoint &, double end, BranchPoint *to) -> PetscErrorCode {
+    PetscFunctionBeginUser;
+    last_ = before;
+    to->parameter = end;
+    to->state = start;
+    PetscCall(step(start, end, &to->found));
+    if (!to->found) PetscFunctionReturn(0);
+    PetscCall(countUnstable(solver_, &to->unstable));
+    solver_.potential().commit(to->state);
+    to->found = to->unstable >= 0;
+    PetscFunctionReturn(0);
+  };
+  BranchPoint low;
+  low.state = start;
+  Point direction;
+  PetscCall(begin(start, &direction));
+  PetscCall(countUnstable(solver_, &low.unstable));
+  CriticalPoint point;
+  bool found = false;
+  if (low.unstable >= 0) PetscCall(locateCritical(follow, low, length, length, &point, &found));
+  last_ = after;
+  iterations_ = iterations;
+  negative_ = negative;
+  if (!found) PetscFunctionReturn(0);
+  point.state->step = start.step;
+  point.limit = false;
+  *located = point;
+  PetscFunctionReturn(0);
+}
+
+/// A step from a critical point along its mode, onto the branch that leaves there (Keller 1977): Newton for equilibrium and the plane normal to the mode.
+PetscErrorCode ArcLength::switchBranch(const State &critical, double length, double shortest, State *state, bool *switched) {
+  PetscFunctionBeginUser;
+  Point mode;
+  last_ = {};
+  obstacle_.clear();
+  PetscCall(begin(critical, &mode));
+  PetscCall(solver_.softestMode(&mode.unknowns));
+  mode.factor = 0;
+  const double norm = size(mode);
+  for (double &d : mode.unknowns) d /= norm;
+  *switched = false;
+  for (; !*switched && length >= shortest; length *= 0.5) PetscCall(step(critical, length, switched, &mode));
+  if (!*switched) PetscFunctionReturn(0);
+  *state = critical;
+  solver_.potential().commit(*state);
   PetscFunctionReturn(0);
 }
 
@@ -290,13 +358,15 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     PetscCall(step(state, length, &converged));
     const double slope = direction.factor;
     Point end;
+    bool crossed = false; // the count of negative pivots has changed
     if (converged) {
       const int negative = negative_;
       PetscCall(tangent(&end));
       // At a limit point an odd number of pivots and the slope change sign together. Pivots alone: a bifurcation, or a turn so sharp that the
       // tangent behind it was taken for the reverse of the tangent before. Short steps tell.
+      crossed = negative != negative_;
       const bool odd = (negative - negative_) % 2 != 0, turns = slope * end.factor < 0;
-      const bool doubtful = odd && !turns && potential.scene().moments.empty() && length > first / 16;
+      const bool doubtful = odd != turns && potential.scene().moments.empty() && length > first / 16;
       if (doubtful || product(direction, end) < least_alignment) {
         converged = false;
         obstacle_ = "the path turns too sharply";
@@ -336,9 +406,31 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     }
     std::swap(direction, end);
     potential.commit(state);
-    const EnergyBudget energy = energyOf(state);
+    EnergyBudget energy = energyOf(state);
     ++taken;
-    if (slope * direction.factor < 0) PetscCall(locateLimit(start, before_step, {slope, direction.factor}, length));
+    std::optional<CriticalPoint> critical;
+    const bool locates = settings_.bifurcation != Bifurcation::off;
+    if (locates && slope * direction.factor < 0)
+      PetscCall(locateLimit(start, before_step, {slope, direction.factor}, length, &critical));
+    else if (locates && crossed && potential.scene().moments.empty())
+      PetscCall(locateBifurcation(start, before_step, length, &critical));
+    if (critical && on_critical) PetscCall(on_critical(*critical));
+    if (critical && settings_.bifurcation == Bifurcation::stop) {
+      state = *critical->state;
+      *finished = true;
+      PetscFunctionReturn(0);
+    }
+    if (critical && !critical->limit && settings_.bifurcation == Bifurcation::switch_branch) {
+      bool switched;
+      PetscCall(switchBranch(*critical->state, length, shortest, &state, &switched));
+      if (!switched) {
+        failure_ = "no branch was found along the critical mode: " + obstacle_;
+        state = *critical->state;
+        PetscFunctionReturn(0);
+      }
+      PetscCall(tangent(&direction));
+      energy = energyOf(state);
+    }
     Diagnostics row;
     row.time = state.time;
     row.dt = std::sqrt(product(last_, last_));

@@ -3,10 +3,8 @@
 #include <algorithm>
 
 namespace tendril {
-namespace {
 
-/// Largest distance between vertices of two states, relative to the size of the scene.
-double distance(const State &a, const State &b) {
+double distanceBetween(const State &a, const State &b) {
   Vec3 low = a.position[0], high = low;
   double apart = 0;
   for (std::size_t v = 0; v < a.position.size(); ++v) {
@@ -17,41 +15,93 @@ double distance(const State &a, const State &b) {
   return apart / (high - low).norm();
 }
 
-} // namespace
+constexpr double sharp = 1e-11; // of the load
 
-PetscErrorCode locateCritical(StepSolver &solver, const State &stable, const Step &step, CriticalPoint *point, bool *found) {
-  constexpr int most_solves = 40;
-  constexpr double interval = 1e-8;
-  // Across a bifurcation the branch moves by about the interval, or by its square root when Newton strays to the branch that leaves.
-  constexpr double near = 1e-2;
+bool SharpTolerance::isMet(const IncrementalPotential::Residual &residual) {
+  constexpr double enough = 100 * sharp;
+  return excess(residual, enough) <= 1 || isAtNoise(residual, enough);
+}
+
+SharpTolerance::SharpTolerance(StepSolver &solver) : solver_(solver) {
+  (void)SNESGetTolerances(solver.snes(), nullptr, &before_, nullptr, nullptr, nullptr);
+  set(std::min(before_, sharp));
+}
+
+SharpTolerance::~SharpTolerance() { set(before_); }
+
+void SharpTolerance::set(PetscReal rtol) {
+  for (NewtonSolver &block : solver_.blocks()) {
+    PetscReal atol, stol;
+    PetscInt iterations, evaluations;
+    (void)SNESGetTolerances(block.snes(), &atol, nullptr, &stol, &iterations, &evaluations);
+    (void)SNESSetTolerances(block.snes(), atol, rtol, stol, iterations, evaluations);
+  }
+}
+
+PetscErrorCode countUnstable(StepSolver &solver, int *unstable) {
+  constexpr double neutral = 1e-9; // of the softest bending: above what Newton and rounding leave of a motion that costs nothing
   PetscFunctionBeginUser;
-  State low = stable;
-  std::optional<State> high;
-  double low_factor = stable.time, high_factor = step.time;
+  PetscCall(solver.inertiaAtIterate(unstable, neutral));
+  PetscFunctionReturn(0);
+}
+
+/// Bisection. Steps begin at `base`, the last point that is not within `aside` of the critical one, where the Hessian is nearly singular and Newton strays.
+static PetscErrorCode bisect(const Follow &follow, BranchPoint *low, BranchPoint *base, double high, double interval, double aside) {
+  PetscFunctionBeginUser;
+  *base = *low;
+  while (high - low->parameter > interval) {
+    const double middle = 0.5 * (low->parameter + high);
+    if (middle <= low->parameter || middle >= high) break;
+    BranchPoint point;
+    PetscCall(follow(*base, middle, &point));
+    if (!point.found && base->parameter != low->parameter) PetscCall(follow(*low, middle, &point)); // towards a limit point, the nearest start is best
+    // What cannot be found counts as beyond: past a limit point there is nothing near to converge to.
+    if (point.found && point.unstable == low->unstable) {
+      *low = point;
+      if (high - middle > aside) *base = point;
+    } else
+      high = middle;
+  }
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode locateCritical(const Follow &follow, BranchPoint low, double high, double scale, CriticalPoint *point, bool *found) {
+  constexpr int most_rounds = 6;
+  constexpr double interval = 1e-9, agreement = 1e-7, part = 1e-3; // of the scale, of the load factor, of the first interval
+  PetscFunctionBeginUser;
   *found = false;
-  // A solve that fails counts as beyond: past a limit point there is nothing near to converge to.
-  for (int solves = 0; solves < most_solves && high_factor - low_factor > interval * std::abs(high_factor); ++solves) {
-    Step middle = step;
-    middle.time = 0.5 * (low_factor + high_factor);
-    middle.load_factor = middle.time;
-    NewtonReport report;
-    PetscCall(solver.solve(low, middle, &report, Seek::equilibrium));
-    State state = low;
-    if (report.converged) solver.potential().commit(state);
-    if (report.converged && report.negative_pivots == 0) {
-      low = state;
-      low_factor = middle.time;
+  const double end = high, aside = std::max(part * (high - low.parameter), 1e-5 * scale);
+  double last = std::nan(""); // what the round before found
+  bool ahead = false;         // whether the branch was found beyond
+  BranchPoint beyond;
+  PetscCall(follow(low, end, &beyond));
+  for (int round = 0; round < most_rounds && !(beyond.found && beyond.unstable == low.unstable); ++round) {
+    BranchPoint base, before;
+    PetscCall(bisect(follow, &low, &base, high, interval * scale, aside));
+    if (std::abs(low.state.time - last) <= agreement * std::abs(last)) {
       *found = true;
+      point->load_factor = low.state.time;
+      point->limit = !ahead;
+      point->state = low.state;
+      PetscFunctionReturn(0);
+    }
+    last = low.state.time;
+    PetscCall(follow(base, low.parameter - aside, &before));
+    if (!before.found || before.unstable != low.unstable) break; // no branch that leads here
+    const double behind = std::min(low.parameter + aside, end);
+    PetscCall(follow(before, behind, &beyond));
+    if (beyond.found && beyond.unstable == low.unstable) { // the step had gone over to another branch: on along this one
+      if (behind == end) break;
+      low = beyond;
+      last = std::nan("");
+      high = end;
+      PetscCall(follow(low, end, &beyond));
     } else {
-      high_factor = middle.time;
-      high.reset();
-      if (report.converged) high = state;
+      ahead = beyond.found;
+      high = behind;
+      low = before;
     }
   }
-  point->load_factor = low_factor;
-  point->limit = high_factor < step.time && (!high || distance(low, *high) > near);
-  point->state = low;
-  point->state->step = stable.step;
   PetscFunctionReturn(0);
 }
 

@@ -17,18 +17,71 @@ Step TimeLoop::stepOf(const LoopSettings &settings, const State &state, double d
   return step;
 }
 
-/// Stability was lost within the step: finds where, and moves `start` there when the run is to end.
-PetscErrorCode TimeLoop::locate(State &start, const Step &step, bool *stop) {
+/// Stability was lost within the step: finds where, and moves `start` there when the run is to end or to go on along another branch.
+PetscErrorCode TimeLoop::locate(State &start, const Step &step, bool *moved) {
   PetscFunctionBeginUser;
+  const double width = step.time - start.time;
   CriticalPoint point;
   bool found;
-  PetscCall(locateCritical(solver_, start, step, &point, &found));
+  {
+    const SharpTolerance sharp(solver_);
+    auto follow = [&](const BranchPoint &from, double factor, BranchPoint *to) -> PetscErrorCode {
+      PetscFunctionBeginUser;
+      *to = from;
+      to->parameter = factor;
+      to->found = false;
+      if (factor <= 0) PetscFunctionReturn(0); // without loads a rod may be in any position
+      Step there = step;
+      there.time = there.load_factor = factor;
+      NewtonReport report;
+      PetscCall(solver_.solve(from.state, there, &report, Seek::equilibrium));
+      to->found = report.converged && SharpTolerance::isMet(report.residual);
+      if (!to->found) PetscFunctionReturn(0);
+      PetscCall(countUnstable(solver_, &to->unstable));
+      solver_.potential().commit(to->state);
+      // Before a limit point a rod moves by the root of the interval; beyond it, Newton jumps.
+      to->found = to->unstable >= 0 && distanceBetween(from.state, to->state) <= std::sqrt(std::abs(factor - from.parameter) / width);
+      PetscFunctionReturn(0);
+    };
+    BranchPoint low;
+    low.parameter = start.time;
+    low.state = start;
+    PetscCall(locateCritical(follow, low, step.time, std::abs(step.time), &point, &found));
+  }
   if (!found) PetscFunctionReturn(0);
+  point.state->step = start.step;
   located_ = point.load_factor;
   if (on_critical) PetscCall(on_critical(point));
-  *stop = settings_.bifurcation == Bifurcation::stop;
-  if (*stop) start = *point.state;
+  const bool leaves = settings_.bifurcation == Bifurcation::switch_branch && !point.limit;
+  *moved = settings_.bifurcation == Bifurcation::stop || leaves;
+  if (!*moved) PetscFunctionReturn(0);
+  start = *point.state;
+  if (!leaves) PetscFunctionReturn(0);
+  Step here = step;
+  here.time = here.load_factor = start.time;
+  solver_.begin(start, here);
+  PetscCall(solver_.softestMode(&mode_.emplace()));
   PetscFunctionReturn(0);
+}
+
+/// Displacements along the critical mode from which Newton begins a step: as long, and to the side, as lowers the energy most.
+Planes TimeLoop::alongMode(const State &start, const Step &step) {
+  IncrementalPotential &potential = solver_.potential();
+  solver_.begin(start, step);
+  Configuration trial = potential.iterate();
+  double best = HUGE_VAL, best_scale = 0;
+  for (double scale = 1e-6; scale < 2; scale *= 2)
+    for (const double s : {scale, -scale}) {
+      const double energy = potential.tryMove(*mode_, s, trial) ? potential.energy(trial) : HUGE_VAL;
+      if (!(energy < best) || best - energy < 1e-12 * std::abs(energy)) continue; // the first of two that are alike
+      best = energy;
+      best_scale = s;
+    }
+  Planes displacements = potential.dofs().makePlanes();
+  if (!potential.tryMove(*mode_, best_scale, trial)) return displacements;
+  potential.accept(trial);
+  potential.coordinates(displacements);
+  return displacements;
 }
 
 /// Solves the stages of a step one after the other; the potential's iterate is the end of the step then. The state is not touched.
@@ -178,7 +231,9 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
         potential.commit(next, rods);
         for (int r = rods.begin; r < rods.end; ++r) addEnergy(next, r);
       };
-      PetscCall(solver_.solve(state, step, &report));
+      std::optional<Planes> guess;
+      if (mode_) guess = alongMode(state, step);
+      PetscCall(solver_.solve(state, step, &report, Seek::minimum, guess ? &*guess : nullptr));
       solver_.on_block = nullptr;
     } else {
       PetscCall(solveStages(state, step, &report));
@@ -191,12 +246,21 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     }
     // Couples have no potential: the inertia of the symmetric part says nothing about stability.
     const bool detects = !settings_.dynamic && settings_.bifurcation != Bifurcation::off && potential.scene().moments.empty();
-    if (detects && stable && report.first_negative_pivots > 0 && located_ <= state.time) {
-      bool stop = false;
-      PetscCall(locate(state, step, &stop));
-      *finished = stop;
-      if (stop) PetscFunctionReturn(0);
+    // Newton may pass an unstable equilibrium and only meet indefinite Hessians. Who asks for a critical load has that looked into.
+    const bool asks = settings_.bifurcation == Bifurcation::stop || settings_.bifurcation == Bifurcation::switch_branch;
+    const bool passed = report.first_negative_pivots > 0 || (asks && report.shifts > 0 && state.time > 0);
+    if (detects && stable && passed && located_ <= state.time) {
+      bool moved = false;
+      PetscCall(locate(state, step, &moved));
+      *finished = moved && settings_.bifurcation == Bifurcation::stop;
+      if (*finished) PetscFunctionReturn(0);
+      if (moved) {
+        next = state;
+        stable = false;
+        continue;
+      }
     }
+    if (report.converged) mode_.reset();
     if (report.converged && plain) {
       next.time = step.time;
       next.step = state.step + 1;

@@ -1,6 +1,7 @@
 #include "tendril/energy/derived.hpp"
 
 #include "tendril/energy/edge.hpp"
+#include "tendril/energy/term.hpp"
 
 namespace tendril {
 namespace {
@@ -35,7 +36,7 @@ template <class Visit> void eachCell(const Elements &elements, const Configurati
 
 } // namespace
 
-RodStrains rodStrains(const Scene &scene, const Elements &elements, const State &state, double motion_time) {
+RodStrains rodStrains(const Scene &scene, const Elements &elements, const State &state, double motion_time, double load_factor) {
   const Configuration c = configurationOf(state, scene, elements, motion_time);
   const std::size_t nv = state.position.size();
   RodStrains out{std::vector<Eigen::Vector2d>(nv, Eigen::Vector2d::Zero()), std::vector<double>(nv, 0.0), std::vector<double>(nv, 0.0)};
@@ -56,6 +57,12 @@ RodStrains rodStrains(const Scene &scene, const Elements &elements, const State 
     if (bends) out.curvature[place.vertex] = Eigen::Vector2d(s[0], s[1]) / cell_length;
     out.twist[place.vertex] = s[2] / cell_length;
   });
+  for (std::size_t r = 0; r < elements.rods.size(); ++r)
+    for (const EndCouple &end : elements.end_couples[r]) {
+      const std::array<double, 3> e = endEnergy(elements, c, end, load_factor);
+      const RodRange &rod = elements.rods[r];
+      out.strain_energy_density[rod.first_vertex + (end.last ? rod.edges : 0)] += e[0] + e[1] + e[2];
+    }
   for (std::size_t v = 0; v < nv; ++v) out.strain_energy_density[v] /= length[v];
   return out;
 }

@@ -14,6 +14,16 @@ std::vector<std::unique_ptr<Term>> makeTerms(const Scene &scene, const Elements 
   return terms;
 }
 
+std::array<double, 3> endEnergy(const Elements &elements, const Configuration &c, const EndCouple &end, double load_factor) {
+  const Frame f = c.frameAt(end.edge);
+  const Vec3 moment = load_factor * (end.moment + end.torque * f.tangent);
+  // Bending strains are curvatures multiplied by the stretch, moments their derivatives by the curvature.
+  double stretch = 1;
+  if (end.cell >= 0) stretch = cellGeometry(c.frameAt(end.cell - 1), c.frameAt(end.cell), readCell<double>(elements.cells(), end.cell)).stretch;
+  const std::array<double, 3> m{moment.dot(f.director) / stretch, moment.dot(f.secondDirector()) / stretch, moment.dot(f.tangent)};
+  return {0.5 * end.compliance[0] * m[0] * m[0], 0.5 * end.compliance[1] * m[1] * m[1], 0.5 * end.compliance[2] * m[2] * m[2]};
+}
+
 [[gnu::flatten]] EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, const Configuration &c, double load_factor,
                                            int r) {
   EnergyBudget budget;
@@ -57,6 +67,11 @@ std::vector<std::unique_ptr<Term>> makeTerms(const Scene &scene, const Elements 
   budget.stretch = 0.5 * reduce(stretch);
   budget.bend += 0.5 * reduce(bend);
   budget.twist += 0.5 * reduce(twist);
+  for (const EndCouple &end : elements.end_couples[r]) {
+    const std::array<double, 3> e = endEnergy(elements, c, end, load_factor);
+    budget.bend += e[0] + e[1];
+    budget.twist += e[2];
+  }
   return budget;
 }
 

@@ -5,6 +5,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <fstream>
 #include <sstream>
@@ -20,6 +21,8 @@ std::string joined(const std::vector<std::string> &words) {
   }
   return text;
 }
+
+constexpr std::array<std::string_view, 4> bifurcations{"off", "locate", "stop", "switch"}; ///< in the order of Bifurcation
 
 [[noreturn]] void fail(const std::string &option, const std::string &message) { throw SceneError("option -" + option + ": " + message); }
 
@@ -170,7 +173,7 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   o->loop.continuation = texts.word("-continuation") == "load" ? Continuation::load : Continuation::arclength;
   if (texts.has("-continuation")) o->continuation = o->loop.continuation;
   const std::string bifurcation = texts.word("-bifurcation");
-  o->loop.bifurcation = bifurcation == "off" ? Bifurcation::off : bifurcation == "locate" ? Bifurcation::locate : Bifurcation::stop;
+  o->loop.bifurcation = Bifurcation(std::find(bifurcations.begin(), bifurcations.end(), bifurcation) - bifurcations.begin());
   if (texts.has("-bifurcation")) o->bifurcation = o->loop.bifurcation;
   if (texts.has("-gravity")) o->gravity = texts.vector("-gravity");
   o->output_dir = texts.text("-output_dir");
@@ -231,8 +234,6 @@ void resolve(const RunSettings &scene, Options &o) {
     o.loop.dt = 1.0 / o.load_steps;
     const bool arclength = o.loop.continuation == Continuation::arclength;
     if (o.arclength_steps && !arclength) fail("arclength_steps", "needs -continuation arclength");
-    if (o.bifurcation && arclength)
-      fail("bifurcation", "belongs to -continuation load; along the arc length, negative_pivots in the diagnostics tells stability");
   }
   checkAccuracy(o);
   if (o.loop.dt_min > o.loop.dt) fail("dt_min", "must not be larger than the step " + std::to_string(o.loop.dt));
@@ -289,7 +290,7 @@ std::string writeOptionsFile(const std::string &path, const Options &o, const Pr
   } else {
     put("load_steps", o.load_steps);
     put("continuation", o.loop.continuation == Continuation::load ? "load" : "arclength");
-    put("bifurcation", o.loop.bifurcation == Bifurcation::off ? "off" : o.loop.bifurcation == Bifurcation::stop ? "stop" : "locate");
+    put("bifurcation", std::string(bifurcations[std::size_t(o.loop.bifurcation)]));
     put("arclength_steps", o.loop.arclength_steps);
   }
   put("dt_min", o.loop.dt_min > 0 ? o.loop.dt_min : o.loop.dt / 1024);

@@ -271,8 +271,10 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, int *exi
     most_kinetic = std::max(most_kinetic, row.energy.kinetic);
     gained = std::max(gained, -dissipated);
     if (!o.loop.dynamic && row.negative_pivots > 0 && !warned) {
-      progress.say("warning: " + std::to_string(row.negative_pivots) +
-                   " negative pivots at an accepted state with couples: couples have no potential, so its stability is not known");
+      const std::string count = std::to_string(row.negative_pivots) + (row.negative_pivots == 1 ? " negative pivot" : " negative pivots");
+      progress.say(run.scene.moments.empty()
+                       ? "from here on, where negative_pivots in the diagnostics is not 0, the path is unstable: " + count
+                       : "warning: " + count + " at an accepted state with couples: couples have no potential, so its stability is not known");
       warned = true;
     }
     PetscCall(PetscLogEventEnd(events().output, 0, 0, 0, 0));

@@ -313,7 +313,7 @@ void TrajectoryWriter::writeFrame(const State &state) {
       if (state_[k] && fields[k].source == source) return true;
     return false;
   };
-  if (wanted(From::strains)) snapshot.strains = rodStrains(scene_, elements_, state, state.time);
+  if (wanted(From::strains)) snapshot.strains = rodStrains(scene_, elements_, state, state.time, dynamic_ ? 1 : state.time);
   if (wanted(From::actions)) snapshot.actions = rodActions(scene_, elements_, state, state.time, dynamic_ ? 1 : state.time);
   for (std::size_t k = 0; k < state_.size(); ++k)
     if (state_[k]) state_[k]->append(fields[k].data(snapshot));

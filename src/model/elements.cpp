@@ -46,6 +46,27 @@ public:
     }
   }
 
+  /// Couples on the end edges of ends that are free to turn.
+  void addEndCouples(const Scene &scene, int rod) {
+    for (const bool last : {false, true}) {
+      const int v = last ? rod_.edges() : 0, edge = last ? rod_.edges() - 1 : 0;
+      if (rod_.closed || holder_[v]) continue;
+      const int cell = range_.slot(last ? edge : 1);
+      EndCouple end{last, range_.slot(edge), out_.constants_[6][cell] != 0 ? cell : -1, {}, Vec3::Zero(), 0};
+      for (const EdgeMoment &m : scene.moments) {
+        if (m.rod != rod || m.edge != edge) continue;
+        end.moment += m.moment;
+        end.torque += m.torque;
+      }
+      if (end.moment.isZero(0) && end.torque == 0) continue;
+      const double half = 0.5 * rod_.edge(edge).norm();
+      const auto [k1, k2] = rod_.material.flexural_stiffness;
+      const std::array<double, 3> stiffness{k1, k2, rod_.material.torsional_stiffness};
+      for (int a = 0; a < 3; ++a) end.compliance[a] = stiffness[a] > 0 ? half / stiffness[a] : 0;
+      out_.end_couples[rod].push_back(end);
+    }
+  }
+
 private:
   const Rod &rod_;
   const RodRange &range_;
@@ -108,7 +129,7 @@ private:
 };
 
 Elements::Elements(const Scene &scene, const DofMap &dofs)
-    : rods(dofs.rods()), slots(dofs.slots()), loose(rods.size()), support_slot(scene.supports.size(), -1), rod_cells{0} {
+    : rods(dofs.rods()), slots(dofs.slots()), loose(rods.size()), end_couples(rods.size()), support_slot(scene.supports.size(), -1), rod_cells{0} {
   const int most = slots + 3 * int(scene.supports.size()); // a frame and two cells for each support along a rod
   constants_ = Planes(7, most);
   cells_ = Planes(cell_planes, most);
@@ -136,9 +157,11 @@ Elements::Elements(const Scene &scene, const DofMap &dofs)
       mass[slot] += 0.5 * rod.material.linear_density * length;
       mass[range.slot(rod.next(i))] += 0.5 * rod.material.linear_density * length;
     }
-    if (range.twist)
-      CellBuilder(scene, int(r), *this).build();
-    else {
+    if (range.twist) {
+      CellBuilder builder(scene, int(r), *this);
+      builder.build();
+      if (!scene.moments.empty()) builder.addEndCouples(scene, int(r));
+    } else {
       cell_begin.push_back(range.first_slot);
       cell_end.push_back(range.first_slot);
     }

@@ -448,12 +448,13 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode NewtonSolver::inertiaAtIterate(int *negative) {
+PetscErrorCode NewtonSolver::inertiaAtIterate(int *negative, double lift) {
   bool regular;
   PetscFunctionBeginUser;
   focus();
   fill(work_->wanted, true);
   PetscCall(assemble(jacobian_));
+  for (int r = rods_.begin; r < rods_.end; ++r) work_->shift[r] = lift * firstShift(r);
   PetscCall(refactor());
   PetscCall(readInertia(&regular));
   *negative = regular ? report_.negative_pivots : -1;

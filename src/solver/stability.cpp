@@ -100,6 +100,81 @@ PetscErrorCode NewtonSolver::shiftUntilPositive(bool regular) {
   PetscFunctionReturn(0);
 }
 
+/// A fixed start without symmetry for the search of a mode, in work_->increment: the same on every machine, orthogonal to no mode of interest.
+void NewtonSolver::beginMode() {
+  const DofMap &dofs = potential_->dofs();
+  work_->increment.clear();
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    const RodRange &rod = dofs.rods()[r];
+    for (int i = 0; i < rod.vertices; ++i)
+      for (int a = 0; a < slot_size; ++a)
+        if (dofs.unknown(rod.slot(i), a) >= 0) work_->increment[a][rod.slot(i)] = 1 + 0.5 * std::sin(1.7 * (slot_size * i + a));
+    dofs.copyBehindRing(rod, work_->increment);
+  }
+}
+
+/// Makes the mode in work_->increment one of unit mass; returns the root of the mass it had.
+double NewtonSolver::normaliseMode() {
+  double mass = 0;
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    const RodRange &rod = potential_->elements().rods[r];
+    for (int a = 0; a < slot_size; ++a)
+      for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) mass += work_->metric[a][s] * work_->increment[a][s] * work_->increment[a][s];
+  }
+  for (double &d : work_->increment) d /= std::sqrt(mass);
+  return std::sqrt(mass);
+}
+
+/// Scales the mode in work_->increment so that the edge that turns most turns by one radian.
+void NewtonSolver::limitTurning() {
+  double turning = 0;
+  const Elements &e = potential_->elements();
+  for (int r = rods_.begin; r < rods_.end; ++r)
+    for (int s = e.rods[r].first_slot; s < e.rods[r].edgeEnd(); ++s) {
+      for (int a = 0; a < 3; ++a) turning = std::max(turning, std::abs(work_->increment[a][s + 1] - work_->increment[a][s]) * e.inverseRestLength()[s]);
+      turning = std::max(turning, std::abs(work_->increment[3][s]));
+    }
+  for (double &d : work_->increment) d /= turning;
+}
+
+/// Inverse iteration.
+PetscErrorCode NewtonSolver::softestMode(double *softest, Planes *mode) {
+  constexpr int iterations = 12;
+  int negative;
+  PetscFunctionBeginUser;
+  PetscCall(inertiaAtIterate(&negative));
+  beginMode();
+  normaliseMode();
+  double stiffness = HUGE_VAL;
+  for (int k = 0; k < iterations; ++k) {
+    Planes right = potential_->dofs().makePlanes();
+    for (int r = rods_.begin; r < rods_.end; ++r) {
+      const RodRange &rod = potential_->elements().rods[r];
+      for (int a = 0; a < slot_size; ++a)
+        for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) right[a][s] = work_->metric[a][s] * work_->increment[a][s];
+    }
+    PetscCall(solveLinear(right, work_->increment));
+    stiffness = 1 / normaliseMode();
+  }
+  if (!(stiffness < *softest)) PetscFunctionReturn(0);
+  *softest = stiffness;
+  limitTurning();
+  // One of the two signs, always the same: its largest displacement is positive.
+  double largest = 0;
+  mode->clear();
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    const RodRange &rod = potential_->elements().rods[r];
+    for (int a = 0; a < slot_size; ++a)
+      for (int s = rod.first_slot; s < rod.vertexEnd() + (rod.closed ? 2 : 0); ++s) {
+        const double d = (*mode)[a][s] = work_->increment[a][s];
+        if (a < 3 && std::abs(d) > std::abs(largest) * (1 + 1e-6)) largest = d;
+      }
+  }
+  if (largest < 0)
+    for (double &d : *mode) d = -d;
+  PetscFunctionReturn(0);
+}
+
 /// A direction of negative curvature at an unstable equilibrium, in work_->increment. With the Hessian K = E - G split into the part E without
 /// compression and the effect G of compression, iterating v <- E^-1 G v gives the first buckling mode, the smoothest way out. Where compression
 /// is not the cause, inverse iteration with the shifted Hessian finds the lowest mode. `neutral`: the mode costs no energy, to rounding, and
@@ -116,15 +191,7 @@ PetscErrorCode NewtonSolver::findBucklingMode(bool *found, bool *neutral) {
     for (int r = rods_.begin; r < rods_.end; ++r) sum += dot(e.rods[r], a, b);
     return sum;
   };
-  // A fixed start without symmetry: the same on every machine, orthogonal to no mode of interest.
-  work_->increment.clear();
-  for (int r = rods_.begin; r < rods_.end; ++r) {
-    const RodRange &rod = e.rods[r];
-    for (int i = 0; i < rod.vertices; ++i)
-      for (int a = 0; a < slot_size; ++a)
-        if (dofs.unknown(rod.slot(i), a) >= 0) work_->increment[a][rod.slot(i)] = 1 + 0.5 * std::sin(1.7 * (slot_size * i + a));
-    dofs.copyBehindRing(rod, work_->increment);
-  }
+  beginMode();
   bool regular;
   for (int r = rods_.begin; r < rods_.end; ++r) potential_->assembleRod(r, HessianKind::uncompressed);
   PetscCall(refactor());
@@ -151,16 +218,8 @@ PetscErrorCode NewtonSolver::findBucklingMode(bool *found, bool *neutral) {
     }
     return y;
   };
-  auto normalise = [&] {
-    Planes heavy = work_->increment;
-    for (int r = rods_.begin; r < rods_.end; ++r)
-      for (int k = 0; k < slot_size; ++k)
-        for (int s = e.rods[r].first_slot; s < e.rods[r].vertexEnd(); ++s) heavy[k][s] *= work_->metric[k][s];
-    const double norm = std::sqrt(sum(work_->increment, heavy));
-    for (double &d : work_->increment) d /= norm;
-  };
   *found = false;
-  normalise();
+  normaliseMode();
   Planes right = soften();
   double stiff = 0, soft = 0;
   for (int k = 0; k < 100 && !*found; ++k) {
@@ -171,7 +230,7 @@ PetscErrorCode NewtonSolver::findBucklingMode(bool *found, bool *neutral) {
     for (int r = rods_.begin; r < rods_.end; ++r) noise += hessianNoise(r, work_->increment);
     *neutral = std::abs(soft - stiff) <= noise;
     *found = k >= 5 && stiff < soft && !*neutral;
-    normalise();
+    normaliseMode();
     right = soften();
   }
   // Compression that makes up for no mode's stiffness leaves a definite Hessian: its negative pivots are rounding.
@@ -188,15 +247,7 @@ PetscErrorCode NewtonSolver::escapeSaddle(bool *left, bool *neutral) {
   bool found;
   PetscCall(findBucklingMode(&found, neutral));
   if (!found) PetscFunctionReturn(0);
-  // One unit: the edge that turns most turns by one radian.
-  double turning = 0;
-  const Elements &e = potential_->elements();
-  for (int r = rods_.begin; r < rods_.end; ++r)
-    for (int s = e.rods[r].first_slot; s < e.rods[r].edgeEnd(); ++s) {
-      for (int a = 0; a < 3; ++a) turning = std::max(turning, std::abs(work_->increment[a][s + 1] - work_->increment[a][s]) * e.inverseRestLength()[s]);
-      turning = std::max(turning, std::abs(work_->increment[3][s]));
-    }
-  for (double &d : work_->increment) d /= turning;
+  limitTurning();
   auto move = [&](RetractionKind kind, double scale) {
     for (int r = rods_.begin; r < rods_.end; ++r)
       if (!potential_->tryMove(work_->increment, scale, r, kind, work_->trial)) return false;

@@ -84,13 +84,23 @@ PetscErrorCode StepSolver::rehearse(const State &start, const Step &step) {
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode StepSolver::inertiaAtIterate(int *negative) {
+PetscErrorCode StepSolver::inertiaAtIterate(int *negative, double lift) {
   PetscFunctionBeginUser;
   *negative = 0;
   for (NewtonSolver &block : blocks_) {
     int one;
-    PetscCall(block.inertiaAtIterate(&one));
+    PetscCall(block.inertiaAtIterate(&one, lift));
     *negative = one < 0 || *negative < 0 ? -1 : *negative + one;
+  }
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode StepSolver::softestMode(Planes *mode) {
+  double softest = HUGE_VAL;
+  PetscFunctionBeginUser;
+  *mode = potential_->dofs().makePlanes();
+  for (NewtonSolver &block : blocks_) {
+    PetscCall(block.softestMode(&softest, mode));
   }
   PetscFunctionReturn(0);
 }

@@ -25,7 +25,7 @@ void solve(Simulation &sim, Scene scene, int load_steps = 2, const char *toleran
 }
 
 RodActions actionsOf(const Simulation &sim) { return rodActions(sim.scene, *sim.elements, sim.state, sim.state.time, 1); }
-RodStrains strainsOf(const Simulation &sim) { return rodStrains(sim.scene, *sim.elements, sim.state, sim.state.time); }
+RodStrains strainsOf(const Simulation &sim) { return rodStrains(sim.scene, *sim.elements, sim.state, sim.state.time, 1); }
 
 /// Cantilevers of both measures and energies under a load at the tip, coarse and fine: `check(sim, edges)`.
 template <class Check> void eachCantilever(const Vec3 &load, Check check) {

@@ -1,6 +1,7 @@
 /// Paths of equilibria: critical loads by inertia (data/reference/buckling_loads.csv), limit points by arc length.
 #include "support/rods.hpp"
 #include "tendril/dynamics/arc_length.hpp"
+#include "tendril/io/scene_reader.hpp"
 
 namespace tendril::test {
 namespace {
@@ -242,7 +243,7 @@ TEST(ArcLength, LoadFallsAndOnePivotIsNegativeBehindTheLimitPoint) {
   EXPECT_LT(path.factor[across], path.critical[0].load_factor);
   for (std::size_t k = 1; k < path.factor.size(); ++k) {
     if (k == across) continue;
-    EXPECT_EQ(path.factor[k] < path.factor[k - 1], k > across) << k;
+    EXPECT_EQ(path.factor[k]<path.factor[k - 1], k> across) << k;
     EXPECT_EQ(path.negative[k], k > across ? 1 : 0) << k;
   }
 }
@@ -288,6 +289,147 @@ TEST(ArcLength, RefusesPrescribedMotionsAndScenesWithoutLoad) {
   EXPECT_NO_THROW(requireDeadLoads(scene));
   scene.supports[0].motion.velocity = Vec3(1, 0, 0);
   EXPECT_THROW(requireDeadLoads(scene), SceneError);
+}
+
+constexpr double step_tolerance = 1e-7; // what two ways to a critical factor may differ by: asked for
+
+Scene sceneOf(const std::string &file) { return readScene(std::string(TENDRIL_SOURCE_DIR) + "/data/scenes/" + file).scene; }
+
+/// The linear equations of the discrete column, half cell at its foot, have the solution sin(w (i + 1/2)) with w = pi/(2 n).
+double discreteEulerLoad(int edges) { return 2.0 * edges * edges * (1 - std::cos(pi / (2 * edges))); }
+
+TEST(CriticalFactor, OfAColumnIsOneWhateverTheSteps) {
+  const Scene scene = sceneOf("column.yaml");
+  const double exact = discreteEulerLoad(64) / 4;
+  for (const int steps : {1, 2, 3, 5, 7, 10, 13, 20, 40, 80, 160}) {
+    const Path path = follow(scene, statics(steps));
+    ASSERT_EQ(path.critical.size(), 1u) << steps;
+    EXPECT_FALSE(path.critical[0].limit) << steps;
+    EXPECT_NEAR(path.critical[0].load_factor, exact, step_tolerance * exact) << steps; // F/EA = 2.5e-8 of it is not in the exact value
+  }
+}
+
+TEST(CriticalFactor, OfAHeavyColumnIsOneWhateverTheSteps) {
+  Scene scene = clampedScene(straightRod(20));
+  scene.rods[0].material.axial_stiffness = 1.6e5; // 5 mm thick, 1 m long
+  scene.gravity = Vec3(-18.86, 0, 0);
+  const double greenhill = criticalLoad("greenhill_clamped_free") / 18.86;
+  double first = 0;
+  for (const int steps : {1, 2, 3, 5, 7, 10, 20, 40, 80, 160}) {
+    const Path path = follow(scene, statics(steps));
+    ASSERT_EQ(path.critical.size(), 1u) << steps;
+    EXPECT_FALSE(path.critical[0].limit) << steps;
+    if (first == 0) first = path.critical[0].load_factor;
+    EXPECT_NEAR(path.critical[0].load_factor, first, step_tolerance * first) << steps;
+  }
+  EXPECT_NEAR(first, greenhill, 2e-3 * greenhill); // of 20 edges: 2.0e-3 x (16/20)^2 in docs/critical_loads.md
+}
+
+/// A rod that hangs out from an axis about which it turns may stand anywhere around it.
+TEST(CriticalFactor, IsNoneWhereAMotionCostsNothing) {
+  const Scene scene = sceneOf("verify/conical.yaml");
+  for (const int steps : {1, 2, 3, 5, 7, 10, 20, 40, 80, 160}) EXPECT_TRUE(follow(scene, statics(steps)).critical.empty()) << steps;
+}
+
+TEST(CriticalFactor, AlongTheArcLengthIsThatOfLoadSteps) {
+  const Scene scene = sceneOf("column.yaml");
+  const double exact = discreteEulerLoad(64) / 4;
+  for (const int steps : {3, 10, 20, 40}) {
+    const Path path = follow(scene, along(steps, 200));
+    ASSERT_EQ(path.critical.size(), 1u) << steps;
+    EXPECT_FALSE(path.critical[0].limit) << steps;
+    EXPECT_NEAR(path.critical[0].load_factor, exact, step_tolerance * exact) << steps;
+    EXPECT_EQ(path.end.time, 1);
+    EXPECT_EQ(path.negative.back(), 2); // in both planes
+  }
+  LoopSettings settings = along(10, 200);
+  settings.bifurcation = Bifurcation::off;
+  EXPECT_TRUE(follow(scene, settings).critical.empty());
+  settings.bifurcation = Bifurcation::stop;
+  const Path stopped = follow(scene, settings);
+  ASSERT_EQ(stopped.critical.size(), 1u);
+  EXPECT_EQ(stopped.end, *stopped.critical[0].state);
+}
+
+/// Load steps snap past it to a stable shape far off.
+TEST(CriticalFactor, OfALimitPointIsThatOfTheArcLength) {
+  const Path path = follow(deepArch(64, 1000), along(20, 30));
+  ASSERT_GE(path.critical.size(), 1u);
+  for (const int steps : {5, 10, 20, 80}) {
+    const Path load = follow(deepArch(64, 1000), stopping(steps));
+    ASSERT_EQ(load.critical.size(), 1u) << steps;
+    EXPECT_TRUE(load.critical[0].limit) << steps;
+    EXPECT_NEAR(load.critical[0].load_factor, path.critical[0].load_factor, step_tolerance) << steps;
+  }
+}
+
+/// A clamped column of length 1 is half of a pinned one of length 2: load P/4, tip at (1 - shortening, 2 ymax) of elastica_postbuckling.csv.
+double buckledTipError(int edges, double slope, LoopSettings settings) {
+  auto exact = referenceRow("elastica_postbuckling.csv", slope);
+  settings.bifurcation = Bifurcation::switch_branch;
+  Scene scene = column(edges, exact["P"] / 4);
+  scene.rods[0].measure = Measure::angle;
+  scene.rods[0].material.axial_stiffness = 1e8; // F/EA = 3e-8
+  const Path path = follow(scene, settings);
+  EXPECT_EQ(path.critical.size(), 1u);
+  EXPECT_EQ(path.end.time, 1);
+  EXPECT_EQ(path.failure, "");
+  const Vec3 tip = path.end.position.back();
+  return Eigen::Vector2d(tip.x() - (1 - exact["shortening"]), tip.tail<2>().norm() - 2 * exact["ymax"]).norm();
+}
+
+TEST(SwitchedBranch, OfEulersColumnIsTheElasticaToSecondOrder) {
+  for (const double slope : {30, 60, 90})
+    for (const bool arclength : {false, true}) {
+      std::array<double, 3> error{};
+      for (int k = 0; k < 3; ++k) error[k] = buckledTipError(16 << k, slope, arclength ? along(20, 200) : statics(20));
+      EXPECT_NEAR(order(error[0], error[1]), 2, order_tolerance) << slope << arclength;
+      EXPECT_NEAR(order(error[1], error[2]), 2, order_tolerance) << slope << arclength;
+      EXPECT_LT(error[2], load_tolerance) << slope << arclength;
+    }
+}
+
+/// Hinged at both ends, so that it is its own mirror image.
+Scene symmetricArch(int edges) {
+  Scene scene = deepArch(edges, 335);
+  scene.supports[0] = hold(scene, 0, 0, Support::Kind::pin);
+  scene.supports.push_back(hold(scene, 0, 0, Support::Kind::fix_twist));
+  return scene;
+}
+
+/// The arch sways to a side under 3.27 EI/R^2. From there the load rises with the square of the sway.
+TEST(SwitchedBranch, OfADeepArchSways) {
+  constexpr double radius = 100;
+  std::array<double, 3> load{};
+  LoopSettings settings = along(20, 60);
+  settings.bifurcation = Bifurcation::stop;
+  for (int k = 0; k < 3; ++k) {
+    const Scene scene = symmetricArch(32 << k);
+    const Path path = follow(scene, settings);
+    ASSERT_EQ(path.critical.size(), 1u);
+    EXPECT_FALSE(path.critical[0].limit);
+    load[k] = path.critical[0].load_factor;
+    EXPECT_LT(std::abs(path.end.position[16 << k].x()), 1e-3 * radius); // where the mode costs nothing, rounding moves along it
+    EXPECT_NEAR(criticalFactor(scene, 20), load[k], step_tolerance * load[k]);
+  }
+  EXPECT_NEAR(order(load[1] - load[0], load[2] - load[1]), 2, order_tolerance);
+  settings.bifurcation = Bifurcation::switch_branch;
+  const Path path = follow(symmetricArch(32), settings);
+  auto sway = [&](const State &state) { return std::abs(state.position[16].x()); };
+  ASSERT_EQ(path.critical.size(), 1u);
+  ASSERT_EQ(path.end.time, 1);
+  EXPECT_GT(sway(path.end), 0.2 * radius);
+  const auto first =
+      std::size_t(std::find_if(path.states.begin(), path.states.end(), [&](const State &s) { return sway(s) > 1e-3 * radius; }) - path.states.begin());
+  ASSERT_LT(first + 2, path.states.size());
+  const double ratio = (path.factor[first + 2] - load[0]) / (path.factor[first + 1] - load[0]);
+  EXPECT_NEAR(ratio, std::pow(sway(path.states[first + 2]) / sway(path.states[first + 1]), 2), 0.02 * ratio); // sways of 0.03 and 0.06 of the radius
+  settings = statics(20);
+  settings.bifurcation = Bifurcation::switch_branch;
+  const Path load_steps = follow(symmetricArch(32), settings);
+  EXPECT_EQ(load_steps.critical.size(), 1u);
+  EXPECT_NEAR(sway(load_steps.end), sway(path.end), 1e-4 * radius); // Newton's 1e-6 of the load, over the little by which the load rises
+  EXPECT_NEAR(load_steps.end.position[16].y(), path.end.position[16].y(), 1e-4 * radius);
 }
 
 /// A free ring of a naturally straight round rod with `turns` turns of twist: is the plane circle unstable? The polygon is in equilibrium by

@@ -16,7 +16,7 @@ public:
   /// The first step is as long as a load step of `settings.dt` is there; steps then adapt to four iterations.
   ArcLength(StepSolver &solver, const LoopSettings &settings);
 
-  CriticalObserver on_critical; ///< told of limit points, before the step that passes them
+  CriticalObserver on_critical; ///< told of critical points, before the step that passes them
   /// Follows the path from `state` until the load factor is 1 or the steps are used up. `finished` is false when a step of the smallest length
   /// failed; `state` is then the last one accepted. Diagnostics' dt is the step along the path.
   PetscErrorCode run(State &state, const TimeLoop::Observer &observe, bool *finished);
@@ -54,8 +54,11 @@ private:
   PetscErrorCode correct(double start, const Point &direction, double length, bool *converged);
   PetscErrorCode correctAt(double factor, bool *converged);
   PetscErrorCode iterate(const std::function<double(const Point &moved, const Point &residual, const Point &load)> &constraint, double start, bool *converged);
-  PetscErrorCode step(const State &state, double length, bool *converged);
-  PetscErrorCode locateLimit(const State &start, const Point &before, const std::array<double, 2> &slopes, double length);
+  PetscErrorCode begin(const State &state, Point *direction);
+  PetscErrorCode step(const State &state, double length, bool *converged, const Point *along = nullptr);
+  PetscErrorCode locateLimit(const State &start, const Point &before, const std::array<double, 2> &slopes, double length, std::optional<CriticalPoint> *point);
+  PetscErrorCode locateBifurcation(const State &start, const Point &before, double length, std::optional<CriticalPoint> *point);
+  PetscErrorCode switchBranch(const State &critical, double length, double shortest, State *state, bool *switched);
 };
 
 } // namespace tendril

@@ -1,6 +1,6 @@
 #pragma once
 /// \file bifurcation.hpp
-/// Where a path of stable equilibria loses its stability: the load factor at which the first pivot of the Hessian changes sign.
+/// Critical points of a branch of equilibria: where the count of motions that lower its energy changes.
 
 #include "tendril/solver/step_solver.hpp"
 
@@ -16,9 +16,40 @@ struct CriticalPoint {
 };
 using CriticalObserver = std::function<PetscErrorCode(const CriticalPoint &)>;
 
-/// Bisects the load factor between `stable` and the end of `step`, where the equilibrium is unstable, to a relative interval of 1e-8, following
-/// the branch by Newton without escapes. `point` is the stable end of the interval. `found` is false when no stable equilibrium was met: then
-/// `stable` was not on the branch.
-PetscErrorCode locateCritical(StepSolver &solver, const State &stable, const Step &step, CriticalPoint *point, bool *found);
+/// An equilibrium on a branch.
+struct BranchPoint {
+  double parameter = 0; ///< of the branch: load factor, or length along it
+  State state;          ///< its time is the load factor
+  int unstable = 0;     ///< motions in which it is no minimum; those that cost nothing are left out
+  bool found = false;   ///< whether Newton came to one, and near
+};
+/// Goes along a branch from a point of it to a value of its parameter, by plain Newton without escapes.
+using Follow = std::function<PetscErrorCode(const BranchPoint &from, double parameter, BranchPoint *to)>;
+
+/// Finds the critical point between `low` and the parameter `high` by bisection to 1e-9 of `scale`, and once more from points on either side of it, in
+/// other steps. `point` is the end of the interval towards `low`. `found` is false where there is none: nothing changes, Newton had gone over to
+/// another branch, or the two answers differ by more than 1e-7, as they do where a count is rounding.
+PetscErrorCode locateCritical(const Follow &follow, BranchPoint low, double high, double scale, CriticalPoint *point, bool *found);
+
+/// Counts the unstable motions at the iterate: eigenvalues of the Hessian below a little less than zero, which leaves motions out that cost nothing.
+PetscErrorCode countUnstable(StepSolver &solver, int *unstable);
+
+/// Largest distance between vertices of two states, relative to the size of the scene.
+double distanceBetween(const State &a, const State &b);
+
+/// While it lives, Newton's tolerance is one that leaves critical loads eight digits.
+class SharpTolerance {
+public:
+  explicit SharpTolerance(StepSolver &solver);
+  ~SharpTolerance();
+  SharpTolerance(const SharpTolerance &) = delete;
+  /// Whether an answer is one by its forces: beside a limit point, where there is none, Newton's corrections may be little, too.
+  static bool isMet(const IncrementalPotential::Residual &residual);
+
+private:
+  StepSolver &solver_;
+  PetscReal before_ = 0;
+  void set(PetscReal rtol);
+};
 
 } // namespace tendril

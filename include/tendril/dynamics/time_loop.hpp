@@ -13,8 +13,9 @@ namespace tendril {
 
 /// Statics: steps of the load factor, or of the arc length of the path of equilibria (ArcLength).
 enum class Continuation { load, arclength };
-/// What to do where a path of minima ends: nothing, locate the critical load and go on, or end the run there.
-enum class Bifurcation { off, locate, stop };
+/// What to do where stability changes along a path: nothing; locate the critical load and go on; end the run there; or go on from there along the branch
+/// that leaves in the direction of the critical mode.
+enum class Bifurcation { off, locate, stop, switch_branch };
 
 /// Dynamics: steps as given, or as long as the error of a step allows.
 enum class Adaptation { none, error };
@@ -29,7 +30,7 @@ struct LoopSettings {
   bool estimate_error = false;             ///< also of steps that are not adapted
   double dt = 1e-2, dt_min = 0, t_end = 1; ///< in statics time is the load factor and ends at 1
   Continuation continuation = Continuation::load;
-  Bifurcation bifurcation = Bifurcation::locate; ///< statics, load steps
+  Bifurcation bifurcation = Bifurcation::locate; ///< statics
   int arclength_steps = 200;                     ///< most steps along the path
   bool mixed = true;
   HessianKind hessian = HessianKind::exact;
@@ -68,6 +69,7 @@ private:
   std::unique_ptr<Integrator> integrator_;
   Integrator::Stages stages_; ///< of the step under way
   double located_ = -1;       ///< last critical load factor
+  std::optional<Planes> mode_; ///< critical mode along which the next step begins
 
   /// Error of the step under way, and what it moved: the largest of any rod, root mean square over its length [turns in rad].
   struct StepError {
@@ -79,7 +81,8 @@ private:
   void finishStages(State &state, double h);
   double nextStep(double time, double *landing) const;
   bool adapt(double h, double dt_min, const StepError &error);
-  PetscErrorCode locate(State &start, const Step &step, bool *stop);
+  PetscErrorCode locate(State &start, const Step &step, bool *moved);
+  Planes alongMode(const State &start, const Step &step);
 };
 
 } // namespace tendril

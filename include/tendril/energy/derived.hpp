@@ -11,10 +11,11 @@ namespace tendril {
 struct RodStrains {
   std::vector<Eigen::Vector2d> curvature;    ///< (nv) about the first and second director, mean of the adjacent edges' [1/m]
   std::vector<double> twist;                 ///< (nv) [rad/m]
-  std::vector<double> strain_energy_density; ///< (nv) of a vertex' cells and half of its edges, over half their reference lengths [J/m]
+  std::vector<double> strain_energy_density; ///< (nv) of a vertex' cells, end couple and half of its edges, over half their reference lengths [J/m]
 };
 /// Prescribed motions are at `motion_time`.
-RodStrains rodStrains(const Scene &scene, const Elements &elements, const State &state, double motion_time);
+/// \param load_factor on the couples of the scene
+RodStrains rodStrains(const Scene &scene, const Elements &elements, const State &state, double motion_time, double load_factor);
 
 /// What the part of a rod towards higher numbers does to the part towards lower ones, in the world frame; elastic, without dissipation.
 struct RodActions {

@@ -94,6 +94,10 @@ template <class T> std::array<T, 3> presentStrain(const Elements &elements, cons
   return elements.measure[rod] == Measure::tan ? cellStrain<Measure::tan>(f0, f1, constants) : cellStrain<Measure::angle>(f0, f1, constants);
 }
 
+/// What an end couple stores in the half edge beyond the last cell, by bending about the first and second director and by twist [J]. That half
+/// turns by moment x compliance, so the couple does twice this work at the end of the rod; the balance of forces is the same with or without it.
+std::array<double, 3> endEnergy(const Elements &elements, const Configuration &configuration, const EndCouple &end, double load_factor);
+
 /// Stored and kinetic energies of a state [J]; centrifugal potential counts as gravity.
 struct EnergyBudget {
   double kinetic = 0, stretch = 0, bend = 0, twist = 0, gravity = 0;

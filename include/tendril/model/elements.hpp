@@ -14,6 +14,16 @@ struct LooseCell {
   int vertex;         ///< slot of the vertex in the middle of its unknowns
 };
 
+/// Half of the end edge of an end that is free to turn, beyond all cells, where couples on that edge act at the end: their moment is the whole
+/// moment of the rod there.
+struct EndCouple {
+  bool last;                        ///< at the last vertex of its rod, or the first
+  int edge, cell;                   ///< slots of the edge and of the cell at its other end, -1 without one
+  std::array<double, 3> compliance; ///< half the edge's length over (kb1, kb2, kt), 0 for a stiffness of zero [1/(N m)]
+  Vec3 moment;                      ///< at load factor 1, fixed in space ... [N m]
+  double torque;                    ///< ... and about the tangent [N m]
+};
+
 class Elements {
 public:
   std::vector<RodRange> rods;
@@ -24,6 +34,7 @@ public:
   /// Regular cells of a rod, [begin, end): the cell at slot s joins the frames at s - 1 and s.
   std::vector<int> cell_begin, cell_end;
   std::vector<std::vector<LooseCell>> loose; ///< per rod
+  std::vector<std::vector<EndCouple>> end_couples; ///< per rod
   std::vector<int> support_slot;             ///< of each support's frame, or -1 where nothing meets it
 
   // In scene order.

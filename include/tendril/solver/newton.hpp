@@ -82,7 +82,10 @@ public:
   /// \param guess displacements and spins to start from instead of the start state
   PetscErrorCode solve(const State &start, NewtonReport *report, Seek seek, const Planes *guess);
   /// Factors the Hessian at the iterate and counts negative pivots; -1 when it cannot be factored.
-  PetscErrorCode inertiaAtIterate(int *negative);
+  /// \param lift of its eigenvalues, in units of the softest bending of each rod
+  PetscErrorCode inertiaAtIterate(int *negative, double lift = 0);
+  /// The softest motion at the iterate, if it is softer [1/s^2] than `softest`. The edge that turns most turns by one radian.
+  PetscErrorCode softestMode(double *softest, Planes *mode);
   /// Solves with the matrix factored last.
   PetscErrorCode solveLinear(const Planes &right, Planes &solution);
 
@@ -139,6 +142,9 @@ private:
   PetscErrorCode verify(bool *little);
   std::string farthest();
   std::string roundingMessage(int rod, double size) const;
+  void beginMode();
+  double normaliseMode();
+  void limitTurning();
   PetscErrorCode findBucklingMode(bool *found, bool *neutral);
   PetscErrorCode escapeSaddle(bool *left, bool *neutral);
   void predict(const State &start);

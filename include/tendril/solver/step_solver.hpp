@@ -27,7 +27,10 @@ public:
   /// Sets the linear solvers up as a step would, so that their options have been asked for before the first step.
   PetscErrorCode rehearse(const State &start, const Step &step);
   /// Factors the Hessian at the iterate and counts negative pivots; -1 when it cannot be factored.
-  PetscErrorCode inertiaAtIterate(int *negative);
+  /// \param lift of its eigenvalues, in units of the softest bending of each rod
+  PetscErrorCode inertiaAtIterate(int *negative, double lift = 0);
+  /// The softest motion at the iterate; where the Hessian is nearly singular, the critical mode. The edge that turns most turns by one radian.
+  PetscErrorCode softestMode(Planes *mode);
 
   IncrementalPotential &potential() { return *potential_; }
   std::deque<NewtonSolver> &blocks() { return blocks_; }
