@@ -242,6 +242,7 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
   report_.iterations = int(iteration);
   const bool moving = potential_->remainingMotion(rods_, work_->motion);
   bool done = true, finite = true, lost = false;
+  creeps_ = false;
   IncrementalPotential::Residual &worst = report_.residual = {};
   for (int r = rods_.begin; r < rods_.end; ++r) {
     const RodRange &rod = potential_->elements().rods[r];
@@ -252,6 +253,7 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
       finite = finite && residual.isFinite();
       const Verdict verdict = residual.isFinite() && !work_->moving[r] ? judge(r, rtol) : Verdict::going;
       lost = lost || verdict == Verdict::lost;
+      creeps_ = creeps_ || verdict == Verdict::saddle;
       work_->wanted[r] = verdict != Verdict::answer;
       done = done && !work_->wanted[r];
     }
@@ -261,7 +263,7 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
   *reason = SNES_CONVERGED_ITERATING;
   if (!finite)
     *reason = SNES_DIVERGED_FNORM_NAN;
-  else if (lost)
+  else if (lost || creeps_)
     *reason = SNES_DIVERGED_LOCAL_MIN; // its meaning here: what is left is rounding
   else if (done)
     *reason = SNES_CONVERGED_FNORM_RELATIVE;
@@ -352,7 +354,7 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
   const IncrementalPotential::RodEnergy before = energyAtIterate(r);
   IncrementalPotential::RodEnergy after;
   Standstill &standstill = work_->standstill[r];
-  standstill.known = work_->shift[r] == 0 && !work_->moving[r];
+  standstill.known = !work_->indefinite[r] && !work_->moving[r];
   standstill.partial = work_->zero[r] > 0;
   standstill.energy = slope;
   auto attempt = [&](double length) {
@@ -391,6 +393,7 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
     standstill.iterations = most_trials; // what energies can tell is spent
     return true;
   }
+  standstill.tiny = work_->indefinite[r] && *lambda >= 1 && sizeOf(r, work_->increment) < 1e-3;
   if (*lambda < 0.1) work_->last_shift[r] *= 16; // a shift that leaves too long a step is too small
   // A full step that gained clearly more than a quadratic would: the minimum lies beyond, as on the way down from a barrier.
   const double gain = (after.value - before.value) / slope;
@@ -403,6 +406,7 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
     } else
       potential_->tryMove(work_->increment, 1, r, work_->trial);
   }
+  if (getenv("DBG")) fprintf(stderr, "DBG it %d r%d E %.10g -> %.10g lam %g slope %g gain %.3g neg %d zero %d shift %g res %g,%g size %g moving %d\n", report_.iterations, r, before.value, after.value, *lambda, slope, (after.value-before.value)/slope, work_->negative[r], work_->zero[r], work_->shift[r], work_->residual[r].force, work_->residual[r].moment, sizeOf(r, work_->increment), work_->moving[r]);
   potential_->accept(work_->trial, r);
   work_->energy[r] = after;
   work_->energy_known[r] = potential_->scene().moments.empty(); // the work of couples is counted from the iterate
@@ -418,6 +422,7 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   PetscCall(moveTo(x));
   PetscCall(readInertia(&regular));
   bool indefinite = false;
+  fill(work_->indefinite, false);
   if (seek_ == Seek::minimum) PetscCall(findIndefinite(y, regular, &indefinite));
   if (indefinite) PetscCall(makeDescent(f, y, regular));
   if (std::any_of(work_->moving.begin() + rods_.begin, work_->moving.begin() + rods_.end, [](char m) { return m; })) PetscCall(includeMotion(y));
@@ -489,7 +494,7 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
   report_.iterations += before;
   PetscCall(SNESGetConvergedReason(snes_, &reason));
   failure->clear();
-  if (reason > 0) PetscFunctionReturn(0);
+  if (reason > 0 || creeps_) PetscFunctionReturn(0); // a saddle nearby is left as one that was reached
   report_.lost = !lost_.empty() && (reason == SNES_DIVERGED_LOCAL_MIN || reason == SNES_DIVERGED_LINE_SEARCH);
   if (report_.lost)
     *failure = lost_;

@@ -99,7 +99,8 @@ NewtonSolver::Verdict NewtonSolver::judge(int r, double rtol) {
   if (!standstill.known || (falls && !noise)) {
     standstill.best = std::min(now, standstill.best);
     if (falls) standstill.iterations = 0;
-    return Verdict::going;
+    standstill.creeping = falls || !standstill.tiny ? 0 : standstill.creeping + 1;
+    return potential_->step().isStatic() && standstill.creeping >= patience ? Verdict::saddle : Verdict::going;
   }
   double size;
   const bool little = isLittle(r, &size);
