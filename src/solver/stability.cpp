@@ -44,7 +44,8 @@ PetscErrorCode NewtonSolver::findIndefinite(Vec y, bool regular, bool *any) {
 /// Many mean compressed edges: then their compression is left out of the Hessian, and the diagonal shifted only if that is not enough.
 /// In statics an equilibrium of couples need not be a minimum of anything: there Newton's own direction stands.
 PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
-  constexpr int few = 4; // the two planes of the first two buckling modes
+  constexpr int few = 4;        // the two planes of the first two buckling modes
+  constexpr double longest = 1; // of the rod's length
   KSP ksp;
   PetscFunctionBeginUser;
   if (regular && circulatory_ && potential_->step().isStatic()) {
@@ -67,6 +68,22 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
   PetscCall(shiftUntilPositive(regular));
   PetscCall(SNESGetKSP(snes_, &ksp));
   PetscCall(KSPSolve(ksp, f, y));
+  // A direction far longer than the rod comes of motions almost without stiffness: a larger shift, instead of a line search that cuts all of it.
+  for (bool longer = potential_->step().isStatic(); longer;) {
+    longer = false;
+    PetscCall(potential_->dofs().scatter(y, rods_, work_->increment));
+    for (int r = rods_.begin; r < rods_.end; ++r)
+      if (work_->wanted[r] && work_->shift[r] > 0) {
+        const double size = sizeOf(r, work_->increment);
+        if (!(size > longest)) continue;
+        work_->last_shift[r] = work_->shift[r] *= std::min(size / longest, 1e6);
+        longer = true;
+      }
+    if (!longer) break;
+    PetscCall(refactor());
+    ++report_.shifts;
+    PetscCall(KSPSolve(ksp, f, y));
+  }
   report_.negative_pivots = unshifted;
   PetscFunctionReturn(0);
 }
