@@ -54,6 +54,21 @@ Planes shiftMetric(const Elements &e, const DofMap &dofs) {
   return metric;
 }
 
+/// Beside the mass, a tension in all edges, of which the slowest wave of a string as long as the rod has the frequency that the mass alone gives it: a shift
+/// of the mass alone moves what is held and what hangs on it by the same, however short the edge between, and lets waves as short as edges buckle first.
+std::vector<double> edgeMetric(const IncrementalPotential &potential) {
+  const Elements &e = potential.elements();
+  std::vector<double> metric(e.slots + lanes, 0.0);
+  for (int r = 0; r < int(e.rods.size()); ++r) {
+    const RodRange &rod = e.rods[r];
+    for (int i = 0; i < rod.edges; ++i) {
+      const double mass = 0.5 * (e.mass()[rod.slot(i)] + e.mass()[rod.slot((i + 1) % rod.vertices)]);
+      metric[rod.slot(i)] = mass * std::pow(potential.length(r) * e.inverseRestLength()[rod.slot(i)] / pi, 2);
+    }
+  }
+  return metric;
+}
+
 /// MUMPS counts pivots only when it looks for null ones, and a large pivot leaves their variables out. Options of the same
 /// names (options/mumps_inertia.yaml) go before these values: PETSc reads them later.
 PetscErrorCode askMumpsForInertia([[maybe_unused]] PC pc, [[maybe_unused]] Mat matrix) {
@@ -75,7 +90,7 @@ NewtonWork::NewtonWork(const IncrementalPotential &potential, int slots)
     : wanted(potential.all().end, true), shift(wanted.size(), 0), last_shift(shift), negative(wanted.size(), 0), zero(negative), indefinite(wanted.size(), false), energy(wanted.size()),
       energy_known(wanted.size(), false), residual(wanted.size()), moving(wanted.size(), false), standstill(wanted.size()), left(wanted.size(), 0),
       load_reach(wanted.size(), 0), load_energy(wanted.size(), 0), increment(slot_size, slots), coordinates(increment), trial(slots),
-      motion(potential.dofs().makePlanes()), metric(shiftMetric(potential.elements(), potential.dofs())) {}
+      motion(potential.dofs().makePlanes()), metric(shiftMetric(potential.elements(), potential.dofs())), edge_metric(edgeMetric(potential)) {}
 
 void NewtonWork::setOrigin(int first_slot) {
   increment.setOrigin(first_slot);
@@ -100,7 +115,8 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
   DofMap &dofs = potential.dofs();
   work_ = &work;
   if (circulatory_.emplace(potential, set); circulatory_->isNone()) circulatory_.reset();
-  system_ = {&dofs, set, &potential.blocks(), &work.metric, &work.wanted, &work.shift, &work.workspace, !potential.scene().rotation.angular_velocity.isZero(0)};
+  system_ = {&dofs, set, &potential.blocks(), &work.metric, &work.wanted, &work.shift, &work.workspace, !potential.scene().rotation.angular_velocity.isZero(0),
+             work.edge_metric.data()};
   const bool whole = set.begin == 0 && set.end == dofs.all().end;
   if (whole)
     PetscCall(DMCreateGlobalVector(dofs.dm(), x_.out()));
@@ -195,17 +211,16 @@ PetscErrorCode NewtonSolver::refill() {
   if (banded_)
     PetscCall(PetscObjectStateIncrease((PetscObject)jacobian_.object()));
   else {
-    PetscCall(potential_->dofs().fillMatrix(potential_->blocks(), jacobian_));
-    if (std::any_of(work_->shift.begin() + rods_.begin, work_->shift.begin() + rods_.end, [](double shift) { return shift != 0; })) {
-      Planes diagonal = work_->metric;
-      for (int r = rods_.begin; r < rods_.end; ++r) {
-        const RodRange &rod = potential_->elements().rods[r];
-        for (int a = 0; a < slot_size; ++a)
-          for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) diagonal[a][s] *= work_->shift[r];
+    EdgeBlocks blocks = potential_->blocks();
+    for (int r = rods_.begin; r < rods_.end; ++r) {
+      const RodRange &rod = potential_->elements().rods[r];
+      for (int a = 0; a < slot_size && work_->shift[r] != 0; ++a) {
+        double *own = blocks.entry(rod, EdgeBlocks::own(a, a)), *vertex = a < 3 ? blocks.entry(rod, EdgeBlocks::vertex(a, a)) : nullptr;
+        for (int i = 0; i < rod.edges; ++i) own[i] += work_->shift[r] * (a < 3 ? work_->edge_metric[rod.slot(i)] : work_->metric[3][rod.slot(i)]);
+        for (int i = 0; i < rod.vertices && vertex; ++i) vertex[i] += work_->shift[r] * work_->metric[a][rod.slot(i)];
       }
-      PetscCall(potential_->dofs().gather(diagonal, rods_, right_));
-      PetscCall(MatDiagonalSet(jacobian_, right_, ADD_VALUES));
     }
+    PetscCall(potential_->dofs().fillMatrix(blocks, jacobian_));
   }
   PetscCall(PetscLogEventEnd(events().fill, 0, 0, 0, 0));
   PetscFunctionReturn(0);

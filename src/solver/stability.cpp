@@ -45,7 +45,7 @@ PetscErrorCode NewtonSolver::findIndefinite(Vec y, bool regular, bool *any) {
 /// In statics an equilibrium of couples need not be a minimum of anything: there Newton's own direction stands.
 PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
   constexpr int few = 4;        // the two planes of the first two buckling modes
-  constexpr double longest = 1; // of the rod's length
+  constexpr double longest = 0.1; // of the rod's length
   KSP ksp;
   PetscFunctionBeginUser;
   if (regular && circulatory_ && potential_->step().isStatic()) {
@@ -154,12 +154,11 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
       Planes y = dofs.makePlanes();
       for (int r = rods_.begin; r < rods_.end; ++r) {
         const RodRange &rod = e.rods[r];
-        if (buckling) {
+        if (buckling)
           softening.multiply(rod, work_->increment, y);
-          dofs.fold(rod, y);
-        } else
-          for (int a = 0; a < slot_size; ++a)
-            for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) y[a][s] = work_->shift[r] * work_->metric[a][s] * work_->increment[a][s];
+        else
+          addMetric(work_->metric, work_->edge_metric.data(), rod, work_->shift[r], work_->increment, y);
+        dofs.fold(rod, y);
       }
       return y;
     };

@@ -72,6 +72,7 @@ struct NewtonWork {
   Planes increment, coordinates;               ///< work arrays
   Configuration trial;
   Planes motion, metric;
+  std::vector<double> edge_metric; ///< per slot
   BandedWorkspace workspace;
 };
 
