@@ -28,8 +28,7 @@ void addMetric(const Planes &metric, const double *edges, const RodRange &rod, d
 }
 
 BandedFactor::BandedFactor(const DofMap &dofs, RodSet set, BandedWorkspace &workspace)
-    : dofs_(dofs), rods_(set), order_(set.end - set.begin), held_(order_.size()), negative_(order_.size(), 0), zero_(order_.size(), 0),
-      workspace_(workspace) {
+    : dofs_(dofs), rods_(set), order_(set.end - set.begin), held_(order_.size()), negative_(order_.size(), 0), zero_(order_.size(), 0), workspace_(workspace) {
   const auto &rods = dofs.rods();
   std::size_t rows = 0;
   for (int r = set.begin; r < set.end; ++r) {

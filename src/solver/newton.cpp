@@ -87,10 +87,11 @@ PetscErrorCode askMumpsForInertia([[maybe_unused]] PC pc, [[maybe_unused]] Mat m
 } // namespace
 
 NewtonWork::NewtonWork(const IncrementalPotential &potential, int slots)
-    : wanted(potential.all().end, true), shift(wanted.size(), 0), last_shift(shift), negative(wanted.size(), 0), zero(negative), indefinite(wanted.size(), false), energy(wanted.size()),
-      energy_known(wanted.size(), false), residual(wanted.size()), moving(wanted.size(), false), standstill(wanted.size()), left(wanted.size(), 0),
-      load_reach(wanted.size(), 0), load_energy(wanted.size(), 0), increment(slot_size, slots), coordinates(increment), trial(slots),
-      motion(potential.dofs().makePlanes()), metric(shiftMetric(potential.elements(), potential.dofs())), edge_metric(edgeMetric(potential)) {}
+    : wanted(potential.all().end, true), shift(wanted.size(), 0), last_shift(shift), negative(wanted.size(), 0), zero(negative),
+      indefinite(wanted.size(), false), energy(wanted.size()), energy_known(wanted.size(), false), residual(wanted.size()), moving(wanted.size(), false),
+      standstill(wanted.size()), left(wanted.size(), 0), load_reach(wanted.size(), 0), load_energy(wanted.size(), 0), increment(slot_size, slots),
+      coordinates(increment), trial(slots), motion(potential.dofs().makePlanes()), metric(shiftMetric(potential.elements(), potential.dofs())),
+      edge_metric(edgeMetric(potential)) {}
 
 void NewtonWork::setOrigin(int first_slot) {
   increment.setOrigin(first_slot);
@@ -115,8 +116,7 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
   DofMap &dofs = potential.dofs();
   work_ = &work;
   if (circulatory_.emplace(potential, set); circulatory_->isNone()) circulatory_.reset();
-  system_ = {&dofs, set, &potential.blocks(), &work.metric, &work.wanted, &work.shift, &work.workspace, !potential.scene().rotation.angular_velocity.isZero(0),
-             work.edge_metric.data()};
+  system_ = {&dofs, set, &potential.blocks(), &work.metric, &work.wanted, &work.shift, &work.workspace, !potential.scene().rotation.angular_velocity.isZero(0)};
   const bool whole = set.begin == 0 && set.end == dofs.all().end;
   if (whole)
     PetscCall(DMCreateGlobalVector(dofs.dm(), x_.out()));
@@ -216,7 +216,8 @@ PetscErrorCode NewtonSolver::refill() {
       const RodRange &rod = potential_->elements().rods[r];
       for (int a = 0; a < slot_size && work_->shift[r] != 0; ++a) {
         double *own = blocks.entry(rod, EdgeBlocks::own(a, a)), *vertex = a < 3 ? blocks.entry(rod, EdgeBlocks::vertex(a, a)) : nullptr;
-        for (int i = 0; i < rod.edges; ++i) own[i] += work_->shift[r] * (a < 3 ? work_->edge_metric[rod.slot(i)] : work_->metric[3][rod.slot(i)]);
+        for (int i = 0; i < rod.edges; ++i)
+          own[i] += work_->shift[r] * (a == 3 ? work_->metric[3][rod.slot(i)] : system_.edge_metric ? system_.edge_metric[rod.slot(i)] : 0);
         for (int i = 0; i < rod.vertices && vertex; ++i) vertex[i] += work_->shift[r] * work_->metric[a][rod.slot(i)];
       }
     }
@@ -421,7 +422,6 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
     } else
       potential_->tryMove(work_->increment, 1, r, work_->trial);
   }
-  if (getenv("DBG")) fprintf(stderr, "DBG it %d r%d E %.10g -> %.10g lam %g slope %g gain %.3g neg %d zero %d shift %g res %g,%g size %g moving %d\n", report_.iterations, r, before.value, after.value, *lambda, slope, (after.value-before.value)/slope, work_->negative[r], work_->zero[r], work_->shift[r], work_->residual[r].force, work_->residual[r].moment, sizeOf(r, work_->increment), work_->moving[r]);
   potential_->accept(work_->trial, r);
   work_->energy[r] = after;
   work_->energy_known[r] = potential_->scene().moments.empty(); // the work of couples is counted from the iterate
@@ -620,6 +620,7 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
   const bool is_static = potential_->step().isStatic();
   PetscFunctionBeginUser;
   focus();
+  system_.edge_metric = is_static ? work_->edge_metric.data() : nullptr; // in dynamics, inertia is what holds short waves
   report_ = {};
   seek_ = seek;
   sharpness_ = 1;

@@ -44,7 +44,7 @@ PetscErrorCode NewtonSolver::findIndefinite(Vec y, bool regular, bool *any) {
 /// Many mean compressed edges: then their compression is left out of the Hessian, and the diagonal shifted only if that is not enough.
 /// In statics an equilibrium of couples need not be a minimum of anything: there Newton's own direction stands.
 PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
-  constexpr int few = 4;        // the two planes of the first two buckling modes
+  constexpr int few = 4;          // the two planes of the first two buckling modes
   constexpr double longest = 0.1; // of the rod's length
   KSP ksp;
   PetscFunctionBeginUser;
@@ -157,7 +157,7 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
         if (buckling)
           softening.multiply(rod, work_->increment, y);
         else
-          addMetric(work_->metric, work_->edge_metric.data(), rod, work_->shift[r], work_->increment, y);
+          addMetric(work_->metric, system_.edge_metric, rod, work_->shift[r], work_->increment, y);
         dofs.fold(rod, y);
       }
       return y;

@@ -128,8 +128,7 @@ NewtonSolver::Verdict NewtonSolver::judge(int r, double rtol) {
 /// out.
 bool NewtonSolver::isBalanced(int r, double rtol) const {
   const IncrementalPotential::Residual &residual = work_->residual[r];
-  return excess(residual, rtol) <= 1 ||
-         (isAtNoise(residual, rtol) && std::max(residual.force_floor, residual.moment_floor) <= potential_->rounding_tolerance);
+  return excess(residual, rtol) <= 1 || (isAtNoise(residual, rtol) && std::max(residual.force_floor, residual.moment_floor) <= potential_->rounding_tolerance);
 }
 
 /// At an equilibrium with its Hessian factored: whether what is left of every rod is little.

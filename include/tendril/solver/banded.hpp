@@ -25,8 +25,8 @@ struct BandedSystem {
   const std::vector<char> *wanted = nullptr;  ///< per rod of the scene; the others are left out, and a solve gives them zero
   const std::vector<double> *shift = nullptr; ///< per rod of the scene
   BandedWorkspace *workspace = nullptr;
-  bool coupled_positions = true;         ///< whether the blocks of vertices have more than a diagonal
-  const double *edge_metric = nullptr;   ///< per slot of the scene, of the square of an edge vector's change; or null: none
+  bool coupled_positions = true;       ///< whether the blocks of vertices have more than a diagonal
+  const double *edge_metric = nullptr; ///< per slot of the scene, of the square of an edge vector's change; or null: none
 };
 
 /// y += scale x metric x v for one rod, copies behind a ring included in v and in y. `edges`: as BandedSystem::edge_metric.

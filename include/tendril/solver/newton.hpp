@@ -114,9 +114,9 @@ private:
   NewtonReport report_;
   Seek seek_ = Seek::minimum;
   double sharpness_ = 1, rtol_ = 0; ///< of -snes_rtol, and what is asked for now
-  double likely_ = 0; ///< residual from which the next iterate is likely an answer
-  std::string lost_;  ///< why the last solve was lost in rounding
-  bool creeps_ = false; ///< whether the last solve ended for creeping towards a saddle
+  double likely_ = 0;               ///< residual from which the next iterate is likely an answer
+  std::string lost_;                ///< why the last solve was lost in rounding
+  bool creeps_ = false;             ///< whether the last solve ended for creeping towards a saddle
 
   PetscErrorCode newton(std::string *failure);
   PetscErrorCode moveTo(Vec x);
