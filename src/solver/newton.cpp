@@ -61,7 +61,9 @@ std::vector<double> edgeMetric(const IncrementalPotential &potential) {
   std::vector<double> metric(e.slots + lanes, 0.0);
   for (int r = 0; r < int(e.rods.size()); ++r) {
     const RodRange &rod = e.rods[r];
-    for (int i = 0; i < rod.edges; ++i) {
+    int held = 0; // a rod that hangs on one place needs none: nothing presses its edges
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) held += e.freedom()[s] == 0;
+    for (int i = 0; i < rod.edges && held > 1; ++i) {
       const double mass = 0.5 * (e.mass()[rod.slot(i)] + e.mass()[rod.slot((i + 1) % rod.vertices)]);
       metric[rod.slot(i)] = mass * std::pow(potential.length(r) * e.inverseRestLength()[rod.slot(i)] / pi, 2);
     }
