@@ -73,7 +73,7 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
     longer = false;
     PetscCall(potential_->dofs().scatter(y, rods_, work_->increment));
     for (int r = rods_.begin; r < rods_.end; ++r)
-      if (work_->wanted[r] && work_->shift[r] > 0) {
+      if (work_->wanted[r] && work_->shift[r] > 0 && work_->edge_metric[potential_->elements().rods[r].first_slot] > 0) { // what hangs on one place swings
         const double size = sizeOf(r, work_->increment);
         if (!(size > longest)) continue;
         work_->last_shift[r] = work_->shift[r] *= std::min(size / longest, 1e6);

@@ -18,8 +18,7 @@ struct Case {
 
 /// A bent and twisted rod of unit length, soft enough that stretch, bending and twist are of one size.
 Rod softRod(Measure measure) {
-  Rod rod =
-      inextensibleRod(helixShape({Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY(), 0.8, 0.1, 1, 0, 10}).points, measure);
+  Rod rod = inextensibleRod(helixShape({Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY(), 0.8, 0.1, 1, 0, 10}).points, measure);
   rod.material.axial_stiffness = 60;
   rod.material.flexural_stiffness = {1, 1.6};
   rod.material.linear_density = 1;
@@ -215,15 +214,13 @@ TEST(EveryTerm, HasTheDerivativeOfItsForces) {
           const Planes up = bench.gradientAt(d, h), down = bench.gradientAt(d, -h);
           Planes change = bench.sim.dofs.makePlanes();
           for (int a = 0; a < slot_size; ++a)
-            for (int s = bench.rod().first_slot; s < bench.rod().vertexEnd(); ++s)
-              change[a][s] = (up[a][s] - down[a][s]) / (2 * h);
+            for (int s = bench.rod().first_slot; s < bench.rod().vertexEnd(); ++s) change[a][s] = (up[a][s] - down[a][s]) / (2 * h);
           return change;
         };
         const Planes fine = difference(small), coarse = difference(2 * small);
         Planes wrong = right;
         for (int a = 0; a < slot_size; ++a)
-          for (int s = bench.rod().first_slot; s < bench.rod().vertexEnd(); ++s)
-            wrong[a][s] -= (4 * fine[a][s] - coarse[a][s]) / 3;
+          for (int s = bench.rod().first_slot; s < bench.rod().vertexEnd(); ++s) wrong[a][s] -= (4 * fine[a][s] - coarse[a][s]) / 3;
         EXPECT_LT(std::sqrt(bench.dot(wrong, wrong) / bench.dot(right, right)), 1e-6);
       }
     }
