@@ -16,9 +16,19 @@ template <class T> const T *as(const double *p) { return reinterpret_cast<const 
 
 } // namespace
 
+void addMetric(const Planes &metric, const double *edges, const RodRange &rod, double scale, const Planes &v, Planes &y) {
+  for (int a = 0; a < slot_size; ++a)
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) y[a][s] += scale * metric[a][s] * v[a][s];
+  for (int a = 0; edges && a < 3; ++a)
+    for (int s = rod.first_slot; s < rod.edgeEnd(); ++s) {
+      const double force = scale * edges[s] * (v[a][s + 1] - v[a][s]);
+      y[a][s] -= force;
+      y[a][s + 1] += force;
+    }
+}
+
 BandedFactor::BandedFactor(const DofMap &dofs, RodSet set, BandedWorkspace &workspace)
-    : dofs_(dofs), rods_(set), order_(set.end - set.begin), held_(order_.size()), negative_(order_.size(), 0), zero_(order_.size(), 0),
-      workspace_(workspace) {
+    : dofs_(dofs), rods_(set), order_(set.end - set.begin), held_(order_.size()), negative_(order_.size(), 0), zero_(order_.size(), 0), workspace_(workspace) {
   const auto &rods = dofs.rods();
   std::size_t rows = 0;
   for (int r = set.begin; r < set.end; ++r) {
@@ -91,7 +101,7 @@ void BandedFactor::factor(const BandedSystem &system) {
 
 template <class T> void BandedFactor::factorGroup(const Group &group, const BandedSystem &system) {
   const RodRange &first = dofs_.rods()[group.rod[0]];
-  std::array<const double *, lanes> source{}, mass{}, spin{};
+  std::array<const double *, lanes> source{}, mass{}, spin{}, edge{};
   std::array<double, lanes> shift{};
   bool shifted = false;
   for (int l = 0; l < (group.packed ? lanes : 1); ++l) {
@@ -99,6 +109,7 @@ template <class T> void BandedFactor::factorGroup(const Group &group, const Band
     source[l] = system.blocks->entry(rod, 0);
     mass[l] = (*system.metric)[0] + rod.first_slot;
     spin[l] = (*system.metric)[3] + rod.first_slot;
+    edge[l] = system.edge_metric ? system.edge_metric + rod.first_slot : nullptr;
     shift[l] = (*system.shift)[group.rod[l]];
     shifted = shifted || shift[l] != 0;
   }
@@ -114,12 +125,14 @@ template <class T> void BandedFactor::factorGroup(const Group &group, const Band
     if (couplesPositions(plane)) return T(0.0);
     return value(std::size_t(plane) * first.slots + i, [](int) { return 0.0; });
   };
-  // A shift adds to the diagonal of positions and twists; the twist of a cable is no unknown.
+  // A shift adds to the diagonal of positions, edges and twists; the twist of a cable is no unknown.
   auto rare = [&](int plane, int i) {
     const std::size_t at = std::size_t(plane) * first.slots + i;
     if (plane == EdgeBlocks::own(3, 3)) return value(at, [&](int l) { return cable ? 1.0 : shift[l] * spin[l][i]; });
     if (plane == EdgeBlocks::vertex(0, 0) || plane == EdgeBlocks::vertex(1, 1) || plane == EdgeBlocks::vertex(2, 2))
       return value(at, [&](int l) { return shift[l] * mass[l][i]; });
+    if (plane == EdgeBlocks::own(0, 0) || plane == EdgeBlocks::own(1, 1) || plane == EdgeBlocks::own(2, 2))
+      return value(at, [&](int l) { return edge[l] && i < first.edges ? shift[l] * edge[l][i] : 0.0; });
     return value(at, [](int) { return 0.0; });
   };
   const std::vector<char> &held = held_[group.rod[0] - rods_.begin];
@@ -301,9 +314,8 @@ PetscErrorCode multiply(Mat a, Vec x, Vec y) {
   for (int r = system->rods.begin; r < system->rods.end; ++r) {
     const RodRange &rod = dofs.rods()[r];
     system->blocks->multiply(rod, in, out);
+    addMetric(*system->metric, system->edge_metric, rod, (*system->shift)[r], in, out);
     dofs.fold(rod, out);
-    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
-      for (int k = 0; k < slot_size; ++k) out[k][s] += (*system->shift)[r] * (*system->metric)[k][s] * in[k][s];
   }
   PetscCall(dofs.gather(out, system->rods, y));
   PetscFunctionReturn(0);

@@ -54,6 +54,23 @@ Planes shiftMetric(const Elements &e, const DofMap &dofs) {
   return metric;
 }
 
+/// Beside the mass, a tension in all edges, of which the slowest wave of a string as long as the rod has the frequency that the mass alone gives it: a shift
+/// of the mass alone moves what is held and what hangs on it by the same, however short the edge between, and lets waves as short as edges buckle first.
+std::vector<double> edgeMetric(const IncrementalPotential &potential) {
+  const Elements &e = potential.elements();
+  std::vector<double> metric(e.slots + lanes, 0.0);
+  for (int r = 0; r < int(e.rods.size()); ++r) {
+    const RodRange &rod = e.rods[r];
+    int held = 0; // a rod that hangs on one place needs none: nothing presses its edges
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) held += e.freedom()[s] == 0;
+    for (int i = 0; i < rod.edges && held > 1; ++i) {
+      const double mass = 0.5 * (e.mass()[rod.slot(i)] + e.mass()[rod.slot((i + 1) % rod.vertices)]);
+      metric[rod.slot(i)] = mass * std::pow(potential.length(r) * e.inverseRestLength()[rod.slot(i)] / pi, 2);
+    }
+  }
+  return metric;
+}
+
 /// MUMPS counts pivots only when it looks for null ones, and a large pivot leaves their variables out. Options of the same
 /// names (options/mumps_inertia.yaml) go before these values: PETSc reads them later.
 PetscErrorCode askMumpsForInertia([[maybe_unused]] PC pc, [[maybe_unused]] Mat matrix) {
@@ -72,10 +89,11 @@ PetscErrorCode askMumpsForInertia([[maybe_unused]] PC pc, [[maybe_unused]] Mat m
 } // namespace
 
 NewtonWork::NewtonWork(const IncrementalPotential &potential, int slots)
-    : wanted(potential.all().end, true), shift(wanted.size(), 0), last_shift(shift), negative(wanted.size(), 0), zero(negative), indefinite(wanted.size(), false), energy(wanted.size()),
-      energy_known(wanted.size(), false), residual(wanted.size()), moving(wanted.size(), false), standstill(wanted.size()), left(wanted.size(), 0),
-      load_reach(wanted.size(), 0), load_energy(wanted.size(), 0), increment(slot_size, slots), coordinates(increment), trial(slots),
-      motion(potential.dofs().makePlanes()), metric(shiftMetric(potential.elements(), potential.dofs())) {}
+    : wanted(potential.all().end, true), shift(wanted.size(), 0), last_shift(shift), negative(wanted.size(), 0), zero(negative),
+      indefinite(wanted.size(), false), energy(wanted.size()), energy_known(wanted.size(), false), residual(wanted.size()), moving(wanted.size(), false),
+      standstill(wanted.size()), left(wanted.size(), 0), load_reach(wanted.size(), 0), load_energy(wanted.size(), 0), increment(slot_size, slots),
+      coordinates(increment), trial(slots), motion(potential.dofs().makePlanes()), metric(shiftMetric(potential.elements(), potential.dofs())),
+      edge_metric(edgeMetric(potential)) {}
 
 void NewtonWork::setOrigin(int first_slot) {
   increment.setOrigin(first_slot);
@@ -195,17 +213,17 @@ PetscErrorCode NewtonSolver::refill() {
   if (banded_)
     PetscCall(PetscObjectStateIncrease((PetscObject)jacobian_.object()));
   else {
-    PetscCall(potential_->dofs().fillMatrix(potential_->blocks(), jacobian_));
-    if (std::any_of(work_->shift.begin() + rods_.begin, work_->shift.begin() + rods_.end, [](double shift) { return shift != 0; })) {
-      Planes diagonal = work_->metric;
-      for (int r = rods_.begin; r < rods_.end; ++r) {
-        const RodRange &rod = potential_->elements().rods[r];
-        for (int a = 0; a < slot_size; ++a)
-          for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) diagonal[a][s] *= work_->shift[r];
+    EdgeBlocks blocks = potential_->blocks();
+    for (int r = rods_.begin; r < rods_.end; ++r) {
+      const RodRange &rod = potential_->elements().rods[r];
+      for (int a = 0; a < slot_size && work_->shift[r] != 0; ++a) {
+        double *own = blocks.entry(rod, EdgeBlocks::own(a, a)), *vertex = a < 3 ? blocks.entry(rod, EdgeBlocks::vertex(a, a)) : nullptr;
+        for (int i = 0; i < rod.edges; ++i)
+          own[i] += work_->shift[r] * (a == 3 ? work_->metric[3][rod.slot(i)] : system_.edge_metric ? system_.edge_metric[rod.slot(i)] : 0);
+        for (int i = 0; i < rod.vertices && vertex; ++i) vertex[i] += work_->shift[r] * work_->metric[a][rod.slot(i)];
       }
-      PetscCall(potential_->dofs().gather(diagonal, rods_, right_));
-      PetscCall(MatDiagonalSet(jacobian_, right_, ADD_VALUES));
     }
+    PetscCall(potential_->dofs().fillMatrix(blocks, jacobian_));
   }
   PetscCall(PetscLogEventEnd(events().fill, 0, 0, 0, 0));
   PetscFunctionReturn(0);
@@ -242,6 +260,7 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
   report_.iterations = int(iteration);
   const bool moving = potential_->remainingMotion(rods_, work_->motion);
   bool done = true, finite = true, lost = false;
+  creeps_ = false;
   IncrementalPotential::Residual &worst = report_.residual = {};
   for (int r = rods_.begin; r < rods_.end; ++r) {
     const RodRange &rod = potential_->elements().rods[r];
@@ -252,6 +271,7 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
       finite = finite && residual.isFinite();
       const Verdict verdict = residual.isFinite() && !work_->moving[r] ? judge(r, rtol) : Verdict::going;
       lost = lost || verdict == Verdict::lost;
+      creeps_ = creeps_ || verdict == Verdict::saddle;
       work_->wanted[r] = verdict != Verdict::answer;
       done = done && !work_->wanted[r];
     }
@@ -261,7 +281,7 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
   *reason = SNES_CONVERGED_ITERATING;
   if (!finite)
     *reason = SNES_DIVERGED_FNORM_NAN;
-  else if (lost)
+  else if (lost || creeps_)
     *reason = SNES_DIVERGED_LOCAL_MIN; // its meaning here: what is left is rounding
   else if (done)
     *reason = SNES_CONVERGED_FNORM_RELATIVE;
@@ -352,7 +372,7 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
   const IncrementalPotential::RodEnergy before = energyAtIterate(r);
   IncrementalPotential::RodEnergy after;
   Standstill &standstill = work_->standstill[r];
-  standstill.known = work_->shift[r] == 0 && !work_->moving[r];
+  standstill.known = !work_->indefinite[r] && !work_->moving[r];
   standstill.partial = work_->zero[r] > 0;
   standstill.energy = slope;
   auto attempt = [&](double length) {
@@ -391,6 +411,7 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
     standstill.iterations = most_trials; // what energies can tell is spent
     return true;
   }
+  standstill.tiny = work_->indefinite[r] && *lambda >= 1 && sizeOf(r, work_->increment) < 1e-3;
   if (*lambda < 0.1) work_->last_shift[r] *= 16; // a shift that leaves too long a step is too small
   // A full step that gained clearly more than a quadratic would: the minimum lies beyond, as on the way down from a barrier.
   const double gain = (after.value - before.value) / slope;
@@ -418,6 +439,7 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   PetscCall(moveTo(x));
   PetscCall(readInertia(&regular));
   bool indefinite = false;
+  fill(work_->indefinite, false);
   if (seek_ == Seek::minimum) PetscCall(findIndefinite(y, regular, &indefinite));
   if (indefinite) PetscCall(makeDescent(f, y, regular));
   if (std::any_of(work_->moving.begin() + rods_.begin, work_->moving.begin() + rods_.end, [](char m) { return m; })) PetscCall(includeMotion(y));
@@ -490,7 +512,7 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
   report_.iterations += before;
   PetscCall(SNESGetConvergedReason(snes_, &reason));
   failure->clear();
-  if (reason > 0) PetscFunctionReturn(0);
+  if (reason > 0 || creeps_) PetscFunctionReturn(0); // a saddle nearby is left as one that was reached
   report_.lost = !lost_.empty() && (reason == SNES_DIVERGED_LOCAL_MIN || reason == SNES_DIVERGED_LINE_SEARCH);
   if (report_.lost)
     *failure = lost_;
@@ -602,6 +624,7 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
   const bool is_static = potential_->step().isStatic();
   PetscFunctionBeginUser;
   focus();
+  system_.edge_metric = is_static ? work_->edge_metric.data() : nullptr; // in dynamics, inertia is what holds short waves
   report_ = {};
   seek_ = seek;
   sharpness_ = 1;

@@ -153,10 +153,13 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
 /// lengths. The compliance of the edges keeps the system regular where the lengths cannot be met. A closed rod is one span whose last edge
 /// meets its first; the corner of its cyclic system enters as a rank-one change (Sherman and Morrison 1950).
 [[gnu::flatten]] void Retraction::projectSpan(const RodRange &rod, int first, int last, C &to) {
-  using std::sqrt;
+  using std::sqrt, std::abs;
   double *soft = work_[softness], *diag = work_[diagonal], *up = work_[upper], *rhs = work_[right], *z = work_[corner];
   const int end = last - 1;
-  for (int sweep = 0; sweep < 2; ++sweep) {
+  constexpr int most_sweeps = 10;
+  double before = HUGE_VAL;
+  for (int sweep = 0; sweep < most_sweeps; ++sweep) {
+    Pack farthest(0.0);
     if (rod.closed) {
       to.closeRing(rod);
       soft[last] = soft[first];
@@ -167,6 +170,7 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
       const Pack length = sqrt(e.squaredNorm());
       for (int a = 0; a < 3; ++a) write(work_[direction + a] + s, select(live, Pack(e[a] / length), Pack(0.0)));
       write(rhs + s, select(live, Pack(length - read<Pack>(work_[target] + s)), Pack(0.0)));
+      farthest = max(farthest, Pack(abs(read<Pack>(rhs + s)) * read<Pack>(elements_.inverseRestLength() + s)));
       const Pack compliance = read<Pack>(elements_.restLength() + s) / read<Pack>(elements_.axialStiffness() + s);
       write(diag + s, select(live, Pack(read<Pack>(soft + s) + read<Pack>(soft + s + 1) + compliance), Pack(1.0)));
     }
@@ -201,6 +205,9 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
       addTwoWords(x[first], low[first], soft[first] * (d[first] - (rod.closed ? d[end] : 0.0)));
       if (!rod.closed) addTwoWords(x[last], low[last], -soft[last] * d[end]);
     }
+    const double error = hmax(farthest);
+    if (sweep > 0 && (error < 1e-5 || error > 0.5 * before)) break;
+    before = error;
   }
   if (rod.closed) to.closeRing(rod);
 }

@@ -44,10 +44,14 @@ PetscErrorCode NewtonSolver::findIndefinite(Vec y, bool regular, bool *any) {
 /// Many mean compressed edges: then their compression is left out of the Hessian, and the diagonal shifted only if that is not enough.
 /// In statics an equilibrium of couples need not be a minimum of anything: there Newton's own direction stands.
 PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
-  constexpr int few = 4; // the two planes of the first two buckling modes
+  constexpr int few = 4;          // the two planes of the first two buckling modes
+  constexpr double longest = 0.1; // of the rod's length
   KSP ksp;
   PetscFunctionBeginUser;
-  if (regular && circulatory_ && potential_->step().isStatic()) PetscFunctionReturn(0);
+  if (regular && circulatory_ && potential_->step().isStatic()) {
+    fill(work_->indefinite, false);
+    PetscFunctionReturn(0);
+  }
   const int unshifted = report_.negative_pivots;
   const HessianKind kind = potential_->step().hessian == HessianKind::exact ? HessianKind::uncompressed : potential_->step().hessian;
   bool compressed = false;
@@ -64,6 +68,22 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
   PetscCall(shiftUntilPositive(regular));
   PetscCall(SNESGetKSP(snes_, &ksp));
   PetscCall(KSPSolve(ksp, f, y));
+  // A direction far longer than the rod comes of motions almost without stiffness: a larger shift, instead of a line search that cuts all of it.
+  for (bool longer = potential_->step().isStatic(); longer;) {
+    longer = false;
+    PetscCall(potential_->dofs().scatter(y, rods_, work_->increment));
+    for (int r = rods_.begin; r < rods_.end; ++r)
+      if (work_->wanted[r] && work_->shift[r] > 0 && work_->edge_metric[potential_->elements().rods[r].first_slot] > 0) { // what hangs on one place swings
+        const double size = sizeOf(r, work_->increment);
+        if (!(size > longest)) continue;
+        work_->last_shift[r] = work_->shift[r] *= std::min(size / longest, 1e6);
+        longer = true;
+      }
+    if (!longer) break;
+    PetscCall(refactor());
+    ++report_.shifts;
+    PetscCall(KSPSolve(ksp, f, y));
+  }
   report_.negative_pivots = unshifted;
   PetscFunctionReturn(0);
 }
@@ -125,16 +145,15 @@ double NewtonSolver::normaliseMode() {
   return std::sqrt(mass);
 }
 
-/// Scales the mode in work_->increment so that the edge that turns most turns by one radian.
-void NewtonSolver::limitTurning() {
-  double turning = 0;
+/// How far the mode in work_->increment turns the edge of a rod that it turns most [rad].
+double NewtonSolver::turningOf(int r) const {
   const Elements &e = potential_->elements();
-  for (int r = rods_.begin; r < rods_.end; ++r)
-    for (int s = e.rods[r].first_slot; s < e.rods[r].edgeEnd(); ++s) {
-      for (int a = 0; a < 3; ++a) turning = std::max(turning, std::abs(work_->increment[a][s + 1] - work_->increment[a][s]) * e.inverseRestLength()[s]);
-      turning = std::max(turning, std::abs(work_->increment[3][s]));
-    }
-  for (double &d : work_->increment) d /= turning;
+  double turning = 0;
+  for (int s = e.rods[r].first_slot; s < e.rods[r].edgeEnd(); ++s) {
+    for (int a = 0; a < 3; ++a) turning = std::max(turning, std::abs(work_->increment[a][s + 1] - work_->increment[a][s]) * e.inverseRestLength()[s]);
+    turning = std::max(turning, std::abs(work_->increment[3][s]));
+  }
+  return turning;
 }
 
 /// Inverse iteration.
@@ -158,7 +177,9 @@ PetscErrorCode NewtonSolver::softestMode(double *softest, Planes *mode) {
   }
   if (!(stiffness < *softest)) PetscFunctionReturn(0);
   *softest = stiffness;
-  limitTurning();
+  double turning = 0;
+  for (int r = rods_.begin; r < rods_.end; ++r) turning = std::max(turning, turningOf(r));
+  for (double &d : work_->increment) d /= turning;
   // One of the two signs, always the same: its largest displacement is positive.
   double largest = 0;
   mode->clear();
@@ -175,101 +196,120 @@ PetscErrorCode NewtonSolver::softestMode(double *softest, Planes *mode) {
   PetscFunctionReturn(0);
 }
 
-/// A direction of negative curvature at an unstable equilibrium, in work_->increment. With the Hessian K = E - G split into the part E without
+/// Directions of negative curvature of the rods with negative pivots, in work_->increment. With the Hessian K = E - G split into the part E without
 /// compression and the effect G of compression, iterating v <- E^-1 G v gives the first buckling mode, the smoothest way out. Where compression
-/// is not the cause, inverse iteration with the shifted Hessian finds the lowest mode. `neutral`: the mode costs no energy, to rounding, and
-/// nothing goes down: a turn of the whole rod about an axis, say.
-PetscErrorCode NewtonSolver::findBucklingMode(bool *found, bool *neutral) {
+/// is not the cause, or leaves motions without stiffness, inverse iteration with the shifted Hessian finds the lowest mode. `neutral`: rods whose mode
+/// costs no energy, to rounding, and that nothing goes down from: a turn of the whole rod about an axis, say.
+PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::vector<char> *neutral) {
   // Of the energies that balance, stiff edges leave 1e-7 by rounding; and what the forces are out of balance by, a neutral motion is curved by.
   const double rounding = std::clamp(10 * report_.residual.force, 1e-7, 1e-5);
   PetscFunctionBeginUser;
   const DofMap &dofs = potential_->dofs();
   const Elements &e = potential_->elements();
-  EdgeBlocks softening = potential_->derivatives(rods_).blocks;
-  auto sum = [&](const Planes &a, const Planes &b) {
-    double sum = 0;
-    for (int r = rods_.begin; r < rods_.end; ++r) sum += dot(e.rods[r], a, b);
-    return sum;
-  };
-  beginMode();
-  bool regular;
-  for (int r = rods_.begin; r < rods_.end; ++r) potential_->assembleRod(r, HessianKind::uncompressed);
-  PetscCall(refactor());
-  PetscCall(readInertia(&regular));
-  const bool buckles = regular && report_.negative_pivots == 0;
-  if (buckles)
-    softening.subtractFrom(potential_->blocks());
-  else {
-    for (int r = rods_.begin; r < rods_.end; ++r) potential_->assembleRod(r, HessianKind::exact);
-    fill(work_->indefinite, true);
-    PetscCall(shiftUntilPositive(false));
-  }
-  // With A v = b solved, v'K v = v'b - v'(A - K)v: the stiff part of A never enters, whose rounding would hide a small curvature.
-  auto soften = [&] { // (A - K) v
-    Planes y = dofs.makePlanes();
-    for (int r = rods_.begin; r < rods_.end; ++r) {
-      const RodRange &rod = e.rods[r];
-      if (buckles) {
-        softening.multiply(rod, work_->increment, y);
-        dofs.fold(rod, y);
-      } else
-        for (int a = 0; a < slot_size; ++a)
-          for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) y[a][s] = work_->shift[r] * work_->metric[a][s] * work_->increment[a][s];
+  const std::vector<int> negative = work_->negative;
+  const EdgeBlocks exact = potential_->derivatives(rods_).blocks;
+  found->assign(work_->wanted.size(), false);
+  neutral->assign(work_->wanted.size(), false);
+  bool regular, done = false;
+  for (const bool buckling : {true, false}) {
+    if (done) break;
+    for (int r = rods_.begin; r < rods_.end; ++r) potential_->assembleRod(r, buckling ? HessianKind::uncompressed : HessianKind::exact);
+    EdgeBlocks softening = exact;
+    if (buckling) {
+      PetscCall(refactor());
+      PetscCall(readInertia(&regular));
+      if (!regular || report_.negative_pivots > 0) continue;
+      softening.subtractFrom(potential_->blocks());
+    } else {
+      fill(work_->indefinite, true);
+      PetscCall(shiftUntilPositive(false));
     }
-    return y;
-  };
-  *found = false;
-  normaliseMode();
-  Planes right = soften();
-  double stiff = 0, soft = 0;
-  for (int k = 0; k < 100 && !*found; ++k) {
-    PetscCall(solveLinear(right, work_->increment));
-    stiff = sum(work_->increment, right);
-    soft = sum(work_->increment, soften());
-    double noise = rounding * std::abs(stiff);
-    for (int r = rods_.begin; r < rods_.end; ++r) noise += hessianNoise(r, work_->increment);
-    *neutral = std::abs(soft - stiff) <= noise;
-    *found = k >= 5 && stiff < soft && !*neutral;
-    normaliseMode();
-    right = soften();
+    const bool definite = buckling && report_.zero_pivots == 0;
+    // With A v = b solved, v'K v = v'b - v'(A - K)v: the stiff part of A never enters, whose rounding would hide a small curvature.
+    auto soften = [&] { // (A - K) v
+      Planes y = dofs.makePlanes();
+      for (int r = rods_.begin; r < rods_.end; ++r) {
+        const RodRange &rod = e.rods[r];
+        if (buckling)
+          softening.multiply(rod, work_->increment, y);
+        else
+          addMetric(work_->metric, system_.edge_metric, rod, work_->shift[r], work_->increment, y);
+        dofs.fold(rod, y);
+      }
+      return y;
+    };
+    auto normalise = [&] {
+      for (int r = rods_.begin; r < rods_.end; ++r) {
+        double square = 0;
+        const RodRange &rod = e.rods[r];
+        for (int a = 0; a < slot_size; ++a)
+          for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) square += work_->metric[a][s] * std::pow(work_->increment[a][s], 2);
+        for (int a = 0; a < slot_size && square > 0; ++a)
+          for (int s = rod.first_slot; s < rod.vertexEnd() + 2; ++s) work_->increment[a][s] /= std::sqrt(square);
+      }
+    };
+    beginMode();
+    normalise();
+    Planes right = soften();
+    for (int k = 0; k < 100 && !done; ++k) {
+      PetscCall(solveLinear(right, work_->increment));
+      const Planes soft = soften();
+      done = true;
+      for (int r = rods_.begin; r < rods_.end; ++r) {
+        if (negative[r] == 0) continue;
+        const double stiffness = dot(e.rods[r], work_->increment, right), softness = dot(e.rods[r], work_->increment, soft);
+        const double noise = rounding * std::abs(stiffness) + hessianNoise(r, work_->increment);
+        (*found)[r] = k >= 5 && softness - stiffness > noise;
+        // Compression that makes up for no mode's stiffness leaves a definite Hessian: its negative pivots are rounding.
+        (*neutral)[r] = std::abs(softness - stiffness) <= noise || (definite && !(softness > 0.5 * stiffness));
+        done = done && (*found)[r];
+      }
+      normalise();
+      right = soften();
+    }
+    done = done || definite;
   }
-  // Compression that makes up for no mode's stiffness leaves a definite Hessian: its negative pivots are rounding.
-  if (buckles && !*found && !(soft > 0.5 * stiff)) *neutral = true;
   for (int r = rods_.begin; r < rods_.end; ++r) potential_->assembleRod(r, potential_->step().hessian);
   PetscFunctionReturn(0);
 }
 
-/// Leaves a saddle along a direction of negative curvature; its side and length come from trials of growing size, with both retractions:
+/// Leaves a saddle along directions of negative curvature; side and length come from trials of growing size, with both retractions:
 /// edges that are just right must keep their lengths, edges that an unstable state holds compressed must be free to grow.
 PetscErrorCode NewtonSolver::escapeSaddle(bool *left, bool *neutral) {
   PetscFunctionBeginUser;
   *left = false;
-  bool found;
-  PetscCall(findBucklingMode(&found, neutral));
-  if (!found) PetscFunctionReturn(0);
-  limitTurning();
-  auto move = [&](RetractionKind kind, double scale) {
-    for (int r = rods_.begin; r < rods_.end; ++r)
-      if (!potential_->tryMove(work_->increment, scale, r, kind, work_->trial)) return false;
-    return true;
-  };
-  RetractionKind best_kind = RetractionKind::length;
-  double best = potential_->energy(potential_->iterate(), rods_), best_scale = 0;
-  for (const RetractionKind kind : {RetractionKind::length, RetractionKind::additive})
-    for (double scale = 1e-6; scale < 2; scale *= 2) // just past a branching of a stiff rod the other branch is that close
-      for (const double s : {scale, -scale}) {
-        const double energy = move(kind, s) ? potential_->energy(work_->trial, rods_) : HUGE_VAL;
-        if (energy >= best) continue;
-        best = energy;
-        best_scale = s;
-        best_kind = kind;
-      }
-  *left = best_scale != 0 && move(best_kind, best_scale);
-  if (!*left) PetscFunctionReturn(0);
+  std::vector<char> found, neutral_rods;
+  const std::vector<int> negative = work_->negative;
+  PetscCall(findBucklingModes(&found, &neutral_rods));
+  const Elements &e = potential_->elements();
+  bool all = true, any = false; // of the rods with negative pivots
   for (int r = rods_.begin; r < rods_.end; ++r) {
+    if (negative[r] > 0) {
+      all = all && neutral_rods[r];
+      any = any || neutral_rods[r];
+    }
+    if (!found[r]) continue;
+    const double turning = turningOf(r); // one unit: the edge that turns most turns by one radian
+    RetractionKind best_kind = RetractionKind::length;
+    double best = potential_->rodEnergy(potential_->iterate(), r).value, best_scale = 0;
+    for (const RetractionKind kind : {RetractionKind::length, RetractionKind::additive})
+      for (double scale = 1e-6; scale < 2; scale *= 2) // just past a branching of a stiff rod the other branch is that close
+        for (const double s : {scale / turning, -scale / turning}) {
+          if (!potential_->tryMove(work_->increment, s, r, kind, work_->trial)) continue;
+          const double energy = potential_->rodEnergy(work_->trial, r).value;
+          if (energy >= best) continue;
+          best = energy;
+          best_scale = s;
+          best_kind = kind;
+        }
+    if (best_scale == 0) continue;
+    potential_->tryMove(work_->increment, best_scale, r, best_kind, work_->trial);
     potential_->accept(work_->trial, r);
     potential_->resetAxialForces(r);
+    *left = true;
   }
+  *neutral = banded_ ? all : any;
+  if (!*left) PetscFunctionReturn(0);
   forgetEnergies();
   ++report_.escapes;
   PetscFunctionReturn(0);

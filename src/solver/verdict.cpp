@@ -99,7 +99,8 @@ NewtonSolver::Verdict NewtonSolver::judge(int r, double rtol) {
   if (!standstill.known || (falls && !noise)) {
     standstill.best = std::min(now, standstill.best);
     if (falls) standstill.iterations = 0;
-    return Verdict::going;
+    standstill.creeping = falls || !standstill.tiny ? 0 : standstill.creeping + 1;
+    return potential_->step().isStatic() && standstill.creeping >= patience ? Verdict::saddle : Verdict::going;
   }
   double size;
   const bool little = isLittle(r, &size);
@@ -127,8 +128,7 @@ NewtonSolver::Verdict NewtonSolver::judge(int r, double rtol) {
 /// out.
 bool NewtonSolver::isBalanced(int r, double rtol) const {
   const IncrementalPotential::Residual &residual = work_->residual[r];
-  return excess(residual, rtol) <= 1 ||
-         (isAtNoise(residual, rtol) && std::max(residual.force_floor, residual.moment_floor) <= potential_->rounding_tolerance);
+  return excess(residual, rtol) <= 1 || (isAtNoise(residual, rtol) && std::max(residual.force_floor, residual.moment_floor) <= potential_->rounding_tolerance);
 }
 
 /// At an equilibrium with its Hessian factored: whether what is left of every rod is little.

@@ -16,7 +16,7 @@ struct BandedWorkspace {
   AlignedVector factors, rows, copy;
 };
 
-/// What there is to factor: blocks + shift x metric (of positions and twists) of the rods that are wanted.
+/// What there is to factor: blocks + shift x metric (of positions and twists, and of edge vectors) of the rods that are wanted.
 struct BandedSystem {
   const DofMap *dofs = nullptr;
   RodSet rods{0, 0};
@@ -25,8 +25,12 @@ struct BandedSystem {
   const std::vector<char> *wanted = nullptr;  ///< per rod of the scene; the others are left out, and a solve gives them zero
   const std::vector<double> *shift = nullptr; ///< per rod of the scene
   BandedWorkspace *workspace = nullptr;
-  bool coupled_positions = true; ///< whether the blocks of vertices have more than a diagonal
+  bool coupled_positions = true;       ///< whether the blocks of vertices have more than a diagonal
+  const double *edge_metric = nullptr; ///< per slot of the scene, of the square of an edge vector's change; or null: none
 };
+
+/// y += scale x metric x v for one rod, copies behind a ring included in v and in y. `edges`: as BandedSystem::edge_metric.
+void addMetric(const Planes &metric, const double *edges, const RodRange &rod, double scale, const Planes &v, Planes &y);
 
 class BandedFactor {
 public:

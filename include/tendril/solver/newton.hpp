@@ -48,6 +48,8 @@ struct Standstill {
   double energy = 0;      ///< gradient times that increment [J]
   double best = HUGE_VAL; ///< smallest excess so far
   int iterations = 0;     ///< since it fell by half
+  bool tiny = false;      ///< whether the last increment is a full but tiny step of a shifted Hessian, ...
+  int creeping = 0;       ///< ... and how many of them did not make it fall by half: so Newton creeps towards a saddle
 };
 
 /// What a solve keeps of rods and slots, for all solvers of a scene: each works on its own rods only.
@@ -70,6 +72,7 @@ struct NewtonWork {
   Planes increment, coordinates;               ///< work arrays
   Configuration trial;
   Planes motion, metric;
+  std::vector<double> edge_metric; ///< per slot
   BandedWorkspace workspace;
 };
 
@@ -114,8 +117,9 @@ private:
   NewtonReport report_;
   Seek seek_ = Seek::minimum;
   double sharpness_ = 1, rtol_ = 0; ///< of -snes_rtol, and what is asked for now
-  double likely_ = 0; ///< residual from which the next iterate is likely an answer
-  std::string lost_;  ///< why the last solve was lost in rounding
+  double likely_ = 0;               ///< residual from which the next iterate is likely an answer
+  std::string lost_;                ///< why the last solve was lost in rounding
+  bool creeps_ = false;             ///< whether the last solve ended for creeping towards a saddle
 
   PetscErrorCode newton(std::string *failure);
   PetscErrorCode moveTo(Vec x);
@@ -130,7 +134,7 @@ private:
   PetscErrorCode includeMotion(Vec y);
   PetscErrorCode includeCirculation(bool *regular);
   bool searchRod(int rod, double *lambda);
-  enum class Verdict { going, answer, lost };
+  enum class Verdict { going, answer, lost, saddle };
   Verdict judge(int rod, double rtol);
   double sizeOf(int rod, const Planes &increment) const;
   double movedBy(int rod) const;
@@ -144,8 +148,8 @@ private:
   std::string roundingMessage(int rod, double size) const;
   void beginMode();
   double normaliseMode();
-  void limitTurning();
-  PetscErrorCode findBucklingMode(bool *found, bool *neutral);
+  double turningOf(int rod) const;
+  PetscErrorCode findBucklingModes(std::vector<char> *found, std::vector<char> *neutral);
   PetscErrorCode escapeSaddle(bool *left, bool *neutral);
   void predict(const State &start);
   const IncrementalPotential::RodEnergy &energyAtIterate(int rod);
