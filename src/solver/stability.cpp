@@ -45,14 +45,13 @@ PetscErrorCode NewtonSolver::findIndefinite(Vec y, bool regular, bool *any) {
 /// In statics an equilibrium of couples need not be a minimum of anything: there Newton's own direction stands.
 PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
   constexpr int few = 4; // the two planes of the first two buckling modes
-  KSP ksp;
   PetscFunctionBeginUser;
   if (regular && circulatory_ && potential_->step().isStatic()) PetscFunctionReturn(0);
   const int unshifted = report_.negative_pivots;
   const HessianKind kind = potential_->step().hessian == HessianKind::exact ? HessianKind::uncompressed : potential_->step().hessian;
   bool compressed = false;
   for (int r = rods_.begin; r < rods_.end; ++r) {
-    if (!work_->wanted[r] || work_->negative[r] <= (banded_ ? few : few * (rods_.end - rods_.begin))) continue;
+    if (!work_->wanted[r] || work_->negative[r] <= (banded_ || inertia_ ? few : few * (rods_.end - rods_.begin))) continue;
     potential_->assembleRod(r, kind);
     compressed = true;
   }
@@ -62,8 +61,7 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
     ++report_.shifts;
   }
   PetscCall(shiftUntilPositive(regular));
-  PetscCall(SNESGetKSP(snes_, &ksp));
-  PetscCall(KSPSolve(ksp, f, y));
+  PetscCall(KSPSolve(factored(), f, y));
   report_.negative_pivots = unshifted;
   PetscFunctionReturn(0);
 }
