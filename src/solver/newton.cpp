@@ -99,6 +99,7 @@ void NewtonWork::setOrigin(int first_slot) {
   increment.setOrigin(first_slot);
   coordinates.setOrigin(first_slot);
   trial.setOrigin(first_slot);
+  if (!kept.empty()) kept.setOrigin(first_slot);
 }
 
 PetscErrorCode registerSolvers() {
@@ -155,6 +156,31 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
     PetscCall(dofs.createMatrix(jacobian_.out()));
   PetscCall(SNESSetJacobian(snes_, jacobian_, jacobian_, jacobianCallback, this));
   if (type && std::string(type) == MATSOLVERMUMPS) PetscCall(askMumpsForInertia(pc, jacobian_));
+  if (!cholesky) {
+    PetscCall(createBandedMatrix(&system_, band_.out()));
+    PetscCall(KSPCreate(PETSC_COMM_SELF, inertia_.out()));
+    PetscCall(KSPSetType(inertia_, KSPPREONLY));
+    PetscCall(KSPGetPC(inertia_, &pc));
+    PetscCall(PCSetType(pc, PCCHOLESKY));
+    PetscCall(PCFactorSetMatSolverType(pc, "banded"));
+    PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGNATURAL));
+  }
+  PetscFunctionReturn(0);
+}
+
+/// The solver whose factorisation has an inertia.
+KSP NewtonSolver::factored() const {
+  KSP ksp = inertia_;
+  if (!ksp) (void)SNESGetKSP(snes_, &ksp);
+  return ksp;
+}
+
+PetscErrorCode NewtonSolver::setUpLinear() {
+  KSP ksp;
+  PetscFunctionBeginUser;
+  PetscCall(SNESGetKSP(snes_, &ksp));
+  PetscCall(KSPSetOperators(ksp, jacobian_, jacobian_));
+  PetscCall(KSPSetUp(ksp));
   PetscFunctionReturn(0);
 }
 
@@ -190,15 +216,29 @@ PetscErrorCode NewtonSolver::evaluate(Vec x, Vec f) {
   for (int r = rods_.begin; r < rods_.end; ++r) {
     if (!work_->wanted[r]) continue;
     const IncrementalPotential::Residual &last = work_->residual[r];
-    d = std::max(last.force, last.moment) < likely_ ? &potential_->gradient(r) : &potential_->derivatives({r, r + 1});
+    d = std::max(last.force, last.moment) < likely_ || sharesFactor() ? &potential_->gradient(r) : &potential_->derivatives({r, r + 1});
   }
   PetscCall(PetscLogEventEnd(events().derivatives, 0, 0, 0, 0));
   if (d) PetscCall(potential_->dofs().gather(d->gradient, rods_, f, &work_->wanted));
   PetscFunctionReturn(0);
 }
 
+/// Whether the next iteration may do with the factorisation that there is.
+bool NewtonSolver::sharesFactor() const {
+  return age_ > 0 && age_ < potential_->quasi_newton && !renew_ && !circulatory_ &&
+         std::none_of(work_->moving.begin() + rods_.begin, work_->moving.begin() + rods_.end, [](char moving) { return moving; });
+}
+
 PetscErrorCode NewtonSolver::assemble(Mat) {
   PetscFunctionBeginUser;
+  fresh_ = !sharesFactor();
+  if (!fresh_) { // the matrix stays as it is, and with it its factorisation
+    ++age_;
+    PetscFunctionReturn(0);
+  }
+  age_ = 1;
+  renew_ = false;
+  secants_.clear();
   for (int r = rods_.begin; r < rods_.end; ++r)
     if (work_->wanted[r]) potential_->derivatives({r, r + 1});
   fill(work_->shift, 0.0);
@@ -210,6 +250,7 @@ PetscErrorCode NewtonSolver::assemble(Mat) {
 PetscErrorCode NewtonSolver::refill() {
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(events().fill, 0, 0, 0, 0));
+  if (inertia_) PetscCall(PetscObjectStateIncrease((PetscObject)band_.object()));
   if (banded_)
     PetscCall(PetscObjectStateIncrease((PetscObject)jacobian_.object()));
   else {
@@ -230,22 +271,19 @@ PetscErrorCode NewtonSolver::refill() {
 }
 
 PetscErrorCode NewtonSolver::refactor() {
-  KSP ksp;
   PetscFunctionBeginUser;
-  PetscCall(SNESGetKSP(snes_, &ksp));
   PetscCall(refill());
-  PetscCall(KSPSetOperators(ksp, jacobian_, jacobian_));
-  PetscCall(KSPSetUp(ksp));
+  Mat matrix = inertia_.object() ? band_.object() : jacobian_.object(); // set anew, or KSP takes it for the one it knows
+  PetscCall(KSPSetOperators(factored(), matrix, matrix));
+  PetscCall(KSPSetUp(factored()));
   PetscFunctionReturn(0);
 }
 
 /// With the matrix factored last; rods that are not wanted have the solution zero.
 PetscErrorCode NewtonSolver::solveLinear(const Planes &right, Planes &solution) {
-  KSP ksp;
   PetscFunctionBeginUser;
-  PetscCall(SNESGetKSP(snes_, &ksp));
   PetscCall(potential_->dofs().gather(right, rods_, right_));
-  PetscCall(KSPSolve(ksp, right_, solution_));
+  PetscCall(KSPSolve(factored(), right_, solution_));
   PetscCall(potential_->dofs().scatter(solution_, rods_, solution));
   PetscFunctionReturn(0);
 }
@@ -290,26 +328,21 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
   PetscFunctionReturn(0);
 }
 
-/// Negative pivots of the factored matrix, per rod where the factorisation tells; `regular` is false when it broke down. Factorisations without
-/// inertia (LU, iterative solvers) report none.
+/// Negative pivots of the factored matrix, per rod where the factorisation tells; `regular` is false when it broke down.
 PetscErrorCode NewtonSolver::readInertia(bool *regular) {
-  KSP ksp;
   PC pc;
   Mat factor;
-  PetscBool cholesky;
   PCFailedReason failed;
   PetscFunctionBeginUser;
-  PetscCall(SNESGetKSP(snes_, &ksp));
-  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(KSPGetPC(factored(), &pc));
   PetscCall(PCGetFailedReason(pc, &failed));
   *regular = failed == PC_NOERROR;
-  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &cholesky));
   fill(work_->negative, 0);
   fill(work_->zero, 0);
   report_.zero_pivots = report_.negative_pivots = 0;
-  if (!cholesky || !*regular) PetscFunctionReturn(0);
+  if (!*regular) PetscFunctionReturn(0);
   PetscCall(PCFactorGetMatrix(pc, &factor));
-  if (const BandedFactor *banded = banded_ ? bandedFactorOf(factor) : nullptr) {
+  if (const BandedFactor *banded = bandedFactorOf(factor)) {
     for (int r = rods_.begin; r < rods_.end; ++r) {
       if (!work_->wanted[r]) continue;
       report_.negative_pivots += work_->negative[r] = banded->negativePivots(r);
@@ -357,6 +390,88 @@ const IncrementalPotential::RodEnergy &NewtonSolver::energyAtIterate(int r) {
   return work_->energy[r];
 }
 
+/// Whether the residual of a rod has fallen enough at the trial.
+bool NewtonSolver::residualFalls(int r, double length, const IncrementalPotential::RodEnergy &trial) {
+  constexpr double sufficient = 1e-4;
+  Configuration &kept = work_->kept;
+  if (kept.empty()) kept = potential_->iterate();
+  kept.copyRod(potential_->elements(), r, potential_->iterate());
+  potential_->accept(work_->trial, r);
+  potential_->gradient(r);
+  const IncrementalPotential::Residual now = potential_->residual(r, trial), before = work_->residual[r];
+  potential_->accept(kept, r);
+  auto size = [](const IncrementalPotential::Residual &residual) { return std::hypot(residual.force, residual.moment); };
+  return now.isFinite() && (size(now) <= (1 - sufficient * length) * size(before) || excess(now, rtol_) <= 1 || isAtNoise(now, rtol_));
+}
+
+/// The direction of the Hessian factored last, corrected by the secants since (two-loop recursion, Nocedal and Wright 2006, algorithm 7.4), rod by rod.
+PetscErrorCode NewtonSolver::secantDirection(Vec f, Vec y) {
+  PetscFunctionBeginUser;
+  const DofMap &dofs = potential_->dofs();
+  const int rods = rods_.end - rods_.begin;
+  auto forRods = [&](auto visit) {
+    for (int r = rods_.begin; r < rods_.end; ++r) {
+      const PetscInt begin = dofs.firstUnknown({r, r + 1}) - dofs.firstUnknown(rods_);
+      visit(r - rods_.begin, begin, begin + dofs.unknowns({r, r + 1}));
+    }
+  };
+  std::vector<std::vector<double>> share(secants_.size(), std::vector<double>(rods));
+  double *q;
+  PetscCall(VecCopy(f, right_));
+  PetscCall(VecGetArray(right_, &q));
+  for (std::size_t k = secants_.size(); k-- > 0;)
+    forRods([&](int r, PetscInt begin, PetscInt end) {
+      const Secant &secant = secants_[k];
+      double product = 0;
+      for (PetscInt i = begin; i < end; ++i) product += secant.step[i] * q[i];
+      share[k][r] = secant.inverse[r] * product;
+      for (PetscInt i = begin; i < end; ++i) q[i] -= share[k][r] * secant.change[i];
+    });
+  PetscCall(VecRestoreArray(right_, &q));
+  PetscCall(KSPSolve(factored(), right_, y));
+  PetscCall(VecGetArray(y, &q));
+  for (std::size_t k = 0; k < secants_.size(); ++k)
+    forRods([&](int r, PetscInt begin, PetscInt end) {
+      const Secant &secant = secants_[k];
+      double product = 0;
+      for (PetscInt i = begin; i < end; ++i) product += secant.change[i] * q[i];
+      const double factor = share[k][r] - secant.inverse[r] * product;
+      for (PetscInt i = begin; i < end; ++i) q[i] += factor * secant.step[i];
+    });
+  PetscCall(VecRestoreArray(y, &q));
+  PetscFunctionReturn(0);
+}
+
+/// The last step, in work_->increment and lengths_, and what it changed of the gradient.
+PetscErrorCode NewtonSolver::addSecant(const std::vector<double> &before, Vec f) {
+  PetscFunctionBeginUser;
+  const DofMap &dofs = potential_->dofs();
+  Secant secant;
+  const double *values;
+  PetscCall(dofs.gather(work_->increment, rods_, right_));
+  PetscCall(VecGetArrayRead(right_, &values));
+  secant.step.assign(values, values + before.size());
+  PetscCall(VecRestoreArrayRead(right_, &values));
+  PetscCall(VecGetArrayRead(f, &values));
+  secant.change.assign(values, values + before.size());
+  PetscCall(VecRestoreArrayRead(f, &values));
+  for (std::size_t i = 0; i < before.size(); ++i) secant.change[i] -= before[i];
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    const PetscInt begin = dofs.firstUnknown({r, r + 1}) - dofs.firstUnknown(rods_), end = begin + dofs.unknowns({r, r + 1});
+    const double length = lengths_[r - rods_.begin];
+    double product = 0, steps = 0, changes = 0;
+    for (PetscInt i = begin; i < end; ++i) {
+      secant.step[i] *= length;
+      product += secant.step[i] * secant.change[i];
+      steps += secant.step[i] * secant.step[i];
+      changes += secant.change[i] * secant.change[i];
+    }
+    secant.inverse.push_back(product > 1e-10 * std::sqrt(steps * changes) ? 1 / product : 0);
+  }
+  secants_.push_back(std::move(secant));
+  PetscFunctionReturn(0);
+}
+
 /// Moves one rod along its increment; false when no length of the step lowers its energy enough.
 bool NewtonSolver::searchRod(int r, double *lambda) {
   constexpr double sufficient = 1e-4;
@@ -372,7 +487,7 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
   const IncrementalPotential::RodEnergy before = energyAtIterate(r);
   IncrementalPotential::RodEnergy after;
   Standstill &standstill = work_->standstill[r];
-  standstill.known = !work_->indefinite[r] && !work_->moving[r];
+  standstill.known = fresh_ && !work_->indefinite[r] && !work_->moving[r];
   standstill.partial = work_->zero[r] > 0;
   standstill.energy = slope;
   auto attempt = [&](double length) {
@@ -387,13 +502,34 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
   };
   // Where the symmetric part is indefinite, couples have nothing that an equilibrium would minimise.
   const bool free = seek_ == Seek::equilibrium || (potential_->step().isStatic() && circulatory_ && circulatory_->acts(r) && work_->negative[r] > 0);
+  const LineSearchKind kind = potential_->line_search;
+  enum class Length { good, too_long, too_short };
+  auto judge = [&](double length) {
+    if (!std::isfinite(after.value)) return Length::too_long;
+    // Supports that move do work: the energy may rise with them, and only has to be finite.
+    if (work_->moving[r] || free) return Length::good;
+    if (kind == LineSearchKind::residual) return residualFalls(r, length, after) ? Length::good : Length::too_long;
+    if (!(after.value <= before.value + sufficient * length * slope + before.noise)) return Length::too_long;
+    constexpr double apart = 1e-3, flat = 0.9;
+    if (kind != LineSearchKind::wolfe || -slope * length * apart < 10 * before.noise) return Length::good;
+    const double beyond = attempt(length * (1 + apart)).value, ahead = attempt(length * (1 - apart)).value;
+    attempt(length); // is the trial again
+    const double there = (beyond - ahead) / (2 * apart * length);
+    return there < flat * slope ? Length::too_short : there > -flat * slope ? Length::too_long : Length::good;
+  };
   *lambda = 1;
   bool accepted = false;
+  double low = 0, high = HUGE_VAL;
   for (int trial = 0; trial < most_trials && !accepted; ++trial) {
     after = attempt(*lambda);
-    // Supports that move do work: the energy may rise with them, and only has to be finite.
-    accepted = std::isfinite(after.value) && (work_->moving[r] || free || after.value <= before.value + sufficient * *lambda * slope + before.noise);
+    const Length length = judge(*lambda);
+    accepted = length == Length::good;
     if (accepted) break;
+    (length == Length::too_short ? low : high) = *lambda;
+    if (kind == LineSearchKind::wolfe && std::isfinite(after.value)) {
+      *lambda = std::isfinite(high) ? 0.5 * (low + high) : 2 * *lambda;
+      continue;
+    }
     // Minimum of the parabola through both energies and the slope, kept within a fifth and a half.
     const double curvature = after.value - before.value - *lambda * slope;
     const double best = std::isfinite(after.value) && curvature > 0 ? -slope * *lambda * *lambda / (2 * curvature) : 0.5 * *lambda;
@@ -403,6 +539,7 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
     double size;
     *lambda = 0; // where the rod stays
     if (excess(work_->residual[r], rtol_) <= 1) return true;
+    if (!fresh_) return renew_ = true;
     if (!standstill.known) return false;
     if (!isLittle(r, &size) && !isNeutral(r)) {
       if (isAtNoise(work_->residual[r], 0)) lost_ = roundingMessage(r, size);
@@ -415,7 +552,7 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
   if (*lambda < 0.1) work_->last_shift[r] *= 16; // a shift that leaves too long a step is too small
   // A full step that gained clearly more than a quadratic would: the minimum lies beyond, as on the way down from a barrier.
   const double gain = (after.value - before.value) / slope;
-  if (!free && *lambda == 1 && gain > 0.6 && gain < 1 && -slope > 1e3 * before.noise) {
+  if (kind == LineSearchKind::energy && !free && *lambda == 1 && gain > 0.6 && gain < 1 && -slope > 1e3 * before.noise) {
     const double longer = std::min(2.0, 0.5 / (1 - gain));
     const IncrementalPotential::RodEnergy beyond = attempt(longer);
     if (beyond.value < after.value) {
@@ -430,6 +567,20 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
   return true;
 }
 
+/// The factorisation with an inertia; where the solver that was chosen broke down, the direction comes from it.
+PetscErrorCode NewtonSolver::solveAgain(Vec f, Vec y) {
+  KSP ksp;
+  KSPConvergedReason reason;
+  PetscFunctionBeginUser;
+  if (!inertia_) PetscFunctionReturn(0);
+  PetscCall(KSPSetOperators(inertia_, band_, band_));
+  PetscCall(KSPSetUp(inertia_));
+  PetscCall(SNESGetKSP(snes_, &ksp));
+  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  if (reason < 0) PetscCall(KSPSolve(inertia_, f, y));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   Vec x, f, y;
   bool regular;
@@ -437,10 +588,14 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   PetscCall(SNESLineSearchGetVecs(search, &x, &f, &y, nullptr, nullptr));
   PetscCall(SNESLineSearchSetReason(search, SNES_LINESEARCH_SUCCEEDED));
   PetscCall(moveTo(x));
+  if (fresh_)
+    PetscCall(solveAgain(f, y));
+  else
+    PetscCall(secantDirection(f, y));
   PetscCall(readInertia(&regular));
   bool indefinite = false;
   fill(work_->indefinite, false);
-  if (seek_ == Seek::minimum) PetscCall(findIndefinite(y, regular, &indefinite));
+  if (fresh_ && seek_ == Seek::minimum) PetscCall(findIndefinite(y, regular, &indefinite));
   if (indefinite) PetscCall(makeDescent(f, y, regular));
   if (std::any_of(work_->moving.begin() + rods_.begin, work_->moving.begin() + rods_.end, [](char m) { return m; })) PetscCall(includeMotion(y));
   PetscCall(potential_->dofs().scatter(y, rods_, work_->increment));
@@ -449,10 +604,19 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   PetscCall(PetscLogEventBegin(events().line_search, 0, 0, 0, 0));
   double shortest = 1;
   bool accepted = true;
+  std::vector<double> before; // the gradient, where secants are wanted
+  if (potential_->quasi_newton > 1) {
+    const double *values;
+    PetscCall(VecGetArrayRead(f, &values));
+    before.assign(values, values + potential_->dofs().unknowns(rods_));
+    PetscCall(VecRestoreArrayRead(f, &values));
+    lengths_.assign(rods_.end - rods_.begin, 0.0);
+  }
   for (int r = rods_.begin; r < rods_.end && accepted; ++r) {
     if (!work_->wanted[r]) continue;
     double lambda;
     accepted = searchRod(r, &lambda);
+    if (!before.empty()) lengths_[r - rods_.begin] = lambda;
     shortest = std::min(shortest, lambda);
     report_.edge_iterations += potential_->elements().rods[r].edges;
   }
@@ -464,6 +628,7 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   }
   PetscCall(writeIterate(x));
   PetscCall(SNESComputeFunction(snes_, x, f));
+  if (!before.empty()) PetscCall(addSecant(before, f));
   PetscReal norm = 0; // only monitors look at it; those of x and y serve tests that are not used here
   if (snes_.object()->numbermonitors > 0) PetscCall(VecNorm(f, NORM_2, &norm));
   PetscCall(SNESLineSearchSetNorms(search, 0, norm, 0));
@@ -475,7 +640,9 @@ PetscErrorCode NewtonSolver::inertiaAtIterate(int *negative, double lift) {
   PetscFunctionBeginUser;
   focus();
   fill(work_->wanted, true);
+  age_ = 0;
   PetscCall(assemble(jacobian_));
+  for (int r = rods_.begin; r < rods_.end && potential_->step().hessian != HessianKind::exact; ++r) potential_->assembleRod(r, HessianKind::exact);
   for (int r = rods_.begin; r < rods_.end; ++r) work_->shift[r] = lift * firstShift(r);
   PetscCall(refactor());
   PetscCall(readInertia(&regular));
@@ -505,6 +672,7 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
   fill(work_->wanted, true);
   fill(work_->standstill, Standstill());
   fill(work_->load_reach, std::nan(""));
+  age_ = 0;
   lost_.clear();
   PetscCall(writeIterate(x_));
   const int before = report_.iterations;

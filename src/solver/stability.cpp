@@ -46,7 +46,6 @@ PetscErrorCode NewtonSolver::findIndefinite(Vec y, bool regular, bool *any) {
 PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
   constexpr int few = 4;          // the two planes of the first two buckling modes
   constexpr double longest = 0.1; // of the rod's length
-  KSP ksp;
   PetscFunctionBeginUser;
   if (regular && circulatory_ && potential_->step().isStatic()) {
     fill(work_->indefinite, false);
@@ -56,7 +55,7 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
   const HessianKind kind = potential_->step().hessian == HessianKind::exact ? HessianKind::uncompressed : potential_->step().hessian;
   bool compressed = false;
   for (int r = rods_.begin; r < rods_.end; ++r) {
-    if (!work_->wanted[r] || work_->negative[r] <= (banded_ ? few : few * (rods_.end - rods_.begin))) continue;
+    if (!work_->wanted[r] || work_->negative[r] <= (banded_ || inertia_ ? few : few * (rods_.end - rods_.begin))) continue;
     potential_->assembleRod(r, kind);
     compressed = true;
   }
@@ -66,8 +65,7 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
     ++report_.shifts;
   }
   PetscCall(shiftUntilPositive(regular));
-  PetscCall(SNESGetKSP(snes_, &ksp));
-  PetscCall(KSPSolve(ksp, f, y));
+  PetscCall(KSPSolve(factored(), f, y));
   // A direction far longer than the rod comes of motions almost without stiffness: a larger shift, instead of a line search that cuts all of it.
   for (bool longer = potential_->step().isStatic(); longer;) {
     longer = false;
@@ -82,7 +80,7 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
     if (!longer) break;
     PetscCall(refactor());
     ++report_.shifts;
-    PetscCall(KSPSolve(ksp, f, y));
+    PetscCall(KSPSolve(factored(), f, y));
   }
   report_.negative_pivots = unshifted;
   PetscFunctionReturn(0);
@@ -308,7 +306,7 @@ PetscErrorCode NewtonSolver::escapeSaddle(bool *left, bool *neutral) {
     potential_->resetAxialForces(r);
     *left = true;
   }
-  *neutral = banded_ ? all : any;
+  *neutral = banded_ || inertia_ ? all : any;
   if (!*left) PetscFunctionReturn(0);
   forgetEnergies();
   ++report_.escapes;

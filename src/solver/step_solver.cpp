@@ -81,6 +81,7 @@ PetscErrorCode StepSolver::rehearse(const State &start, const Step &step) {
   PetscFunctionBeginUser;
   begin(start, step);
   PetscCall(inertiaAtIterate(&negative));
+  for (NewtonSolver &block : blocks_) PetscCall(block.setUpLinear());
   PetscFunctionReturn(0);
 }
 

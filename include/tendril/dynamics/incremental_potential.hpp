@@ -10,6 +10,10 @@
 
 namespace tendril {
 
+/// What makes a step long enough and not too long: an energy that falls enough (Armijo 1966); its slope, too, to a part of what it was
+/// (strong Wolfe conditions, Nocedal and Wright 2006, 3.7); or a residual that falls, whatever the energy does.
+enum class LineSearchKind { energy, wolfe, residual };
+
 class IncrementalPotential {
 public:
   IncrementalPotential(const Scene &scene, DofMap &dofs, const Elements &elements, bool dynamic);
@@ -17,6 +21,8 @@ public:
   RetractionKind retraction = RetractionKind::length; ///< of moves that do not name another
   /// Where rounding keeps Newton from its tolerance: what is left counts as nothing below this part of what a step moves.
   double rounding_tolerance = 1e-3;
+  LineSearchKind line_search = LineSearchKind::energy;
+  int quasi_newton = 1; ///< iterations that share a factorisation
 
   /// Starts a step; then every rod has to be started before anything else is asked of it: its iterate is the start state with supports'
   /// frames (not yet their positions) moved to the end of the step.

@@ -36,6 +36,8 @@ struct LoopSettings {
   HessianKind hessian = HessianKind::exact;
   RetractionKind retraction = RetractionKind::length;
   double rounding_tolerance = 1e-3; ///< see IncrementalPotential
+  LineSearchKind line_search = LineSearchKind::energy;
+  int quasi_newton = 1;
 };
 
 /// How a loop is stepping: with the state, all that goes on from step to step.

@@ -33,6 +33,7 @@ private:
 using OwnedDM = Owned<DM, DMDestroy>;
 using OwnedVec = Owned<Vec, VecDestroy>;
 using OwnedMat = Owned<Mat, MatDestroy>;
+using OwnedKSP = Owned<KSP, KSPDestroy>;
 using OwnedSNES = Owned<SNES, SNESDestroy>;
 using OwnedSection = Owned<PetscSection, PetscSectionDestroy>;
 

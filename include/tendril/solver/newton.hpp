@@ -70,7 +70,7 @@ struct NewtonWork {
   std::vector<double> left;                    ///< of the answer, over the rod's length: what Newton would still move it by; 0 where the tolerance was met
   std::vector<double> load_reach, load_energy; ///< what the loads would move, and the energy of that [J]; not a number where not known
   Planes increment, coordinates;               ///< work arrays
-  Configuration trial;
+  Configuration trial, kept;                   ///< `kept`: the iterate while another is tried in its place
   Planes motion, metric;
   std::vector<double> edge_metric; ///< per slot
   BandedWorkspace workspace;
@@ -84,6 +84,8 @@ public:
   /// Minimises the potential of the step, which has begun. The potential's iterate is the answer when `report` says converged.
   /// \param guess displacements and spins to start from instead of the start state
   PetscErrorCode solve(const State &start, NewtonReport *report, Seek seek, const Planes *guess);
+  /// Sets up the linear solver with the matrix assembled last, for the mistakes in its options to come to light.
+  PetscErrorCode setUpLinear();
   /// Factors the Hessian at the iterate and counts negative pivots; -1 when it cannot be factored.
   /// \param lift of its eigenvalues, in units of the softest bending of each rod
   PetscErrorCode inertiaAtIterate(int *negative, double lift = 0);
@@ -110,6 +112,8 @@ private:
   BandedSystem system_;
   OwnedMat jacobian_;
   bool banded_ = true;
+  OwnedMat band_;    ///< where the solver that was chosen has no inertia: the same matrix once more, ...
+  OwnedKSP inertia_; ///< ... factored by `banded`, which tells what is a minimum, and how far an iterate is from it
   OwnedVec x_, f_, right_, solution_;
   std::optional<Circulatory> circulatory_; ///< where couples act
   Vec iterate_vec_ = nullptr;              ///< vector that holds the coordinates of the potential's iterate, ...
@@ -117,14 +121,24 @@ private:
   NewtonReport report_;
   Seek seek_ = Seek::minimum;
   double sharpness_ = 1, rtol_ = 0; ///< of -snes_rtol, and what is asked for now
-  double likely_ = 0;               ///< residual from which the next iterate is likely an answer
-  std::string lost_;                ///< why the last solve was lost in rounding
-  bool creeps_ = false;             ///< whether the last solve ended for creeping towards a saddle
+  /// A step and what it changed of the gradient, by unknowns; per rod one over their product, 0 where that is not positive (BFGS).
+  struct Secant {
+    std::vector<double> step, change, inverse;
+  };
+  std::vector<Secant> secants_; ///< since the Hessian was factored
+  std::vector<double> lengths_; ///< of the last step, per rod
+  int age_ = 0;                 ///< iterations that the factorisation has served
+  bool fresh_ = true, renew_ = false;
+  double likely_ = 0;   ///< residual from which the next iterate is likely an answer
+  std::string lost_;    ///< why the last solve was lost in rounding
+  bool creeps_ = false; ///< whether the last solve ended for creeping towards a saddle
 
   PetscErrorCode newton(std::string *failure);
   PetscErrorCode moveTo(Vec x);
   PetscErrorCode writeIterate(Vec x);
+  KSP factored() const;
   PetscErrorCode readInertia(bool *regular);
+  PetscErrorCode solveAgain(Vec f, Vec y);
   PetscErrorCode refill();
   PetscErrorCode refactor();
   PetscErrorCode makeDescent(Vec f, Vec y, bool regular);
@@ -134,6 +148,10 @@ private:
   PetscErrorCode includeMotion(Vec y);
   PetscErrorCode includeCirculation(bool *regular);
   bool searchRod(int rod, double *lambda);
+  bool residualFalls(int rod, double length, const IncrementalPotential::RodEnergy &trial);
+  bool sharesFactor() const;
+  PetscErrorCode secantDirection(Vec f, Vec y);
+  PetscErrorCode addSecant(const std::vector<double> &before, Vec f);
   enum class Verdict { going, answer, lost, saddle };
   Verdict judge(int rod, double rtol);
   double sizeOf(int rod, const Planes &increment) const;
