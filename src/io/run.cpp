@@ -315,10 +315,14 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, int *exi
   progress.say(summary.str());
   if (closed && gained > 0.1 * most_kinetic) {
     std::ostringstream growth;
-    growth << "warning: the energy rose by " << std::setprecision(2) << gained / most_kinetic
-           << " of the largest kinetic energy, with nothing to put it in but -integrator " << o.loop.integrator.name
-           << " in steps too long for it: shorten -dt, or take bdf2 or energy_momentum";
-    progress.say(growth.str());
+    growth << "the energy rose by " << std::setprecision(2) << gained / most_kinetic << " of the largest kinetic energy, with nothing to put it in but -integrator "
+           << o.loop.integrator.name << " in steps too long for it: shorten -dt, or take bdf2 or energy_momentum";
+    // A method that is unstable has made most of the motion itself.
+    if (finished && gained > 0.5 * most_kinetic) {
+      finished = false;
+      failure = growth.str();
+    } else
+      progress.say("warning: " + growth.str());
   }
   if (last.rounding_error > 0) {
     std::ostringstream rounding;
