@@ -107,7 +107,7 @@ TEST(Tension, StretchesByItsLaw) {
       if (energy == Energy::seed)
         for (int k = 0; k < 100; ++k) stretch -= (axial * stretch * (stretch * stretch - 1) / 2 - force) / (axial * (3 * stretch * stretch - 1) / 2);
       const RodActions actions = rodActions(s.sim.scene, *s.sim.elements, s.sim.state, 1, 1);
-      const RodStrains strains = rodStrains(s.sim.scene, *s.sim.elements, s.sim.state, 1);
+      const RodStrains strains = rodStrains(s.sim.scene, *s.sim.elements, s.sim.state, 1, 1);
       for (int i = 0; i < edges; ++i) {
         EXPECT_NEAR(s.edge(i).norm() * edges, stretch, exact) << i;
         EXPECT_NEAR(actions.force[i][0], force, exact * axial) << i;
