@@ -274,7 +274,6 @@ rows = [
     ("unknown continuation", None, ["-mode", "static", "-continuation", "arc"], ["-continuation", "arc"]),
     ("continuation in dynamics", None, ["-continuation", "arclength"], ["-continuation", "no meaning"]),
     ("bifurcation in dynamics", None, ["-bifurcation", "stop"], ["-bifurcation", "no meaning"]),
-    ("bifurcation along the arc length", None, ["-mode", "static", "-continuation", "arclength", "-bifurcation", "stop"], ["-bifurcation", "negative_pivots"]),
     ("no steps along the path", None, ["-mode", "static", "-continuation", "arclength", "-arclength_steps", "0"], ["-arclength_steps", "at least 1"]),
     ("steps along the path for load steps", None, ["-mode", "static", "-arclength_steps", "5"], ["-arclength_steps", "-continuation arclength"]),
     ("path without a load", None, ["-mode", "static", "-continuation", "arclength", "-gravity", "0,0,0"], ["needs a load"]),

@@ -88,7 +88,7 @@ def every_field_with_its_unit(folder):
     t = Trajectory(folder + "/out")
     counts = {"vertices": 5 + 6 + 3, "edges": 4 + 6 + 2, "cells": 3 + 6}
     assert t.format_version == 2 and sorted(t.field_names) == sorted(PLACES), t.field_names
-    with h5py.File(folder + "/out/trajectory.h5", "r", swmr=True, locking=False) as f:
+    with h5py.File(folder + "/out/trajectory.h5", "r", locking=False) as f:
         for name, (place, components, unit) in PLACES.items():
             field, stored = t.field(name), f["state/" + name][:]
             assert (field.place, field.unit, t.unit(name)) == (place, unit, unit), field
