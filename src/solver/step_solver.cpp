@@ -110,7 +110,7 @@ PetscErrorCode StepSolver::solveBlock(NewtonSolver &block, const State &start, N
     add(coarse);
     if (coarse.converged) {
       PetscCall(block.solve(start, report, Seek::minimum, &guess));
-      solved = report->converged;
+      solved = report->converged || report->lost;
       if (!solved) before.iterations += report->iterations;
       if (!solved) add(*report);
     }
