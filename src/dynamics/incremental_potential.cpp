@@ -283,6 +283,14 @@ void IncrementalPotential::resetAxialForces(int r) {
   known_[r] = Known::nothing;
 }
 
+void IncrementalPotential::setAxialForces(int r, const double *force) {
+  if (!step_.mixed) return;
+  const RodRange &rod = elements_.rods[r];
+  std::copy(force + rod.first_slot, force + rod.edgeEnd(), iterate_[C::axial_force] + rod.first_slot);
+  iterate_.closeRing(rod);
+  known_[r] = Known::nothing;
+}
+
 bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r, RetractionKind kind, Configuration &trial) {
   if (trial.empty()) trial = iterate_;
   trial.copyEnds(elements_, r, iterate_);
@@ -340,8 +348,9 @@ void IncrementalPotential::coordinates(Planes &x, RodSet rods) const {
   }
 }
 
-void IncrementalPotential::moveTo(const Planes &x, RodSet rods) {
+void IncrementalPotential::moveTo(const Planes &x, RodSet rods, bool supports) {
   Planes now = dofs_.makePlanes(), increment = now;
+  if (supports) remainingMotion(rods, increment);
   coordinates(now, rods);
   Configuration trial;
   for (int r = rods.begin; r < rods.end; ++r) {
@@ -349,7 +358,7 @@ void IncrementalPotential::moveTo(const Planes &x, RodSet rods) {
     bool moves = false;
     for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
       for (int a = 0; a < slot_size; ++a) {
-        increment[a][s] = dofs_.unknown(s, a) >= 0 ? x[a][s] - now[a][s] : 0.0;
+        if (dofs_.unknown(s, a) >= 0) increment[a][s] = x[a][s] - now[a][s];
         moves = moves || increment[a][s] != 0;
       }
     dofs_.copyBehindRing(rod, increment);

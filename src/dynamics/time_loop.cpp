@@ -65,7 +65,7 @@ PetscErrorCode TimeLoop::locate(State &start, const Step &step, bool *moved) {
 }
 
 /// Displacements along the critical mode from which Newton begins a step: as long, and to the side, as lowers the energy most.
-Planes TimeLoop::alongMode(const State &start, const Step &step) {
+Guess TimeLoop::alongMode(const State &start, const Step &step) {
   IncrementalPotential &potential = solver_.potential();
   solver_.begin(start, step);
   Configuration trial = potential.iterate();
@@ -77,11 +77,11 @@ Planes TimeLoop::alongMode(const State &start, const Step &step) {
       best = energy;
       best_scale = s;
     }
-  Planes displacements = potential.dofs().makePlanes();
-  if (!potential.tryMove(*mode_, best_scale, trial)) return displacements;
+  Guess guess{potential.dofs().makePlanes(), {}};
+  if (!potential.tryMove(*mode_, best_scale, trial)) return guess;
   potential.accept(trial);
-  potential.coordinates(displacements);
-  return displacements;
+  potential.coordinates(guess.unknowns);
+  return guess;
 }
 
 /// Solves the stages of a step one after the other; the potential's iterate is the end of the step then. The state is not touched.
@@ -231,7 +231,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
         potential.commit(next, rods);
         for (int r = rods.begin; r < rods.end; ++r) addEnergy(next, r);
       };
-      std::optional<Planes> guess;
+      std::optional<Guess> guess;
       if (mode_) guess = alongMode(state, step);
       PetscCall(solver_.solve(state, step, &report, Seek::minimum, guess ? &*guess : nullptr));
       solver_.on_block = nullptr;

@@ -323,7 +323,7 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
     *reason = SNES_DIVERGED_LOCAL_MIN; // its meaning here: what is left is rounding
   else if (done)
     *reason = SNES_CONVERGED_FNORM_RELATIVE;
-  else if (iteration >= limit)
+  else if (iteration >= limit || (patience_ > 0 && spent_ + iteration >= patience_))
     *reason = SNES_DIVERGED_MAX_IT;
   PetscFunctionReturn(0);
 }
@@ -675,9 +675,9 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
   age_ = 0;
   lost_.clear();
   PetscCall(writeIterate(x_));
-  const int before = report_.iterations;
+  spent_ = report_.iterations;
   PetscCall(SNESSolve(snes_, nullptr, x_));
-  report_.iterations += before;
+  report_.iterations += spent_;
   PetscCall(SNESGetConvergedReason(snes_, &reason));
   failure->clear();
   if (reason > 0 || creeps_) PetscFunctionReturn(0); // a saddle nearby is left as one that was reached
@@ -786,7 +786,7 @@ void NewtonSolver::predict(const State &start) {
   }
 }
 
-PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, Seek seek, const Planes *guess) {
+PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, Seek seek, const Guess *guess, int patience) {
   constexpr int most_rounds = 4; // of a tolerance made sharper
   std::string failure;
   const bool is_static = potential_->step().isStatic();
@@ -795,14 +795,17 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
   system_.edge_metric = is_static ? work_->edge_metric.data() : nullptr; // in dynamics, inertia is what holds short waves
   report_ = {};
   seek_ = seek;
+  patience_ = patience;
   sharpness_ = 1;
   likely_ = 0;
   fill(work_->last_shift, 0.0); // a step depends on its start alone
   for (int r = rods_.begin; r < rods_.end; ++r) potential_->beginRod(start, r);
   forgetEnergies();
-  if (guess)
-    potential_->moveTo(*guess, rods_);
-  else if (!is_static)
+  if (guess) {
+    const bool complete = guess->axial_force.size() > 0;
+    potential_->moveTo(guess->unknowns, rods_, complete);
+    for (int r = rods_.begin; r < rods_.end && complete; ++r) potential_->setAxialForces(r, guess->axial_force[0]);
+  } else if (!is_static)
     predict(start);
   if (potential_->beyondBarrier())
     failure = "a support turns past the barrier of measure tan at 180 degrees of twist per vertex; use more edges, or measure: angle";

@@ -1,5 +1,7 @@
 #include "tendril/solver/step_solver.hpp"
 
+#include "tendril/dynamics/coarse.hpp"
+
 #include <algorithm>
 
 namespace tendril {
@@ -60,7 +62,7 @@ void StepSolver::begin(const State &start, const Step &step) {
   for (int r = 0; r < potential_->all().end; ++r) potential_->beginRod(start, r);
 }
 
-PetscErrorCode StepSolver::solve(const State &start, const Step &step, NewtonReport *report, Seek seek, const Planes *guess) {
+PetscErrorCode StepSolver::solve(const State &start, const Step &step, NewtonReport *report, Seek seek, const Guess *guess) {
   PetscFunctionBeginUser;
   potential_->beginStep(start, step);
   *report = {};
@@ -68,11 +70,58 @@ PetscErrorCode StepSolver::solve(const State &start, const Step &step, NewtonRep
   report->reason = "converged";
   for (NewtonSolver &block : blocks_) {
     NewtonReport one;
-    PetscCall(block.solve(start, &one, seek, guess));
+    if (step.isStatic() && seek == Seek::minimum && !guess)
+      PetscCall(solveBlock(block, start, &one));
+    else
+      PetscCall(block.solve(start, &one, seek, guess));
     report->include(one);
     if (!one.converged) break;
     if (on_block) on_block(block.rods());
   }
+  PetscFunctionReturn(0);
+}
+
+/// Statics. Fine rods that do not converge soon begin again where fewer edges lead; where that leads nowhere, Newton has all the iterations it may take.
+PetscErrorCode StepSolver::solveBlock(NewtonSolver &block, const State &start, NewtonReport *report) {
+  constexpr int patience = 10;
+  PetscFunctionBeginUser;
+  const std::vector<RodRange> &rods = potential_->elements().rods;
+  const bool fine = std::any_of(rods.begin() + block.rods().begin, rods.begin() + block.rods().end, [](const RodRange &rod) { return rod.edges > fine_edges; });
+  NewtonReport before; // what other tries took
+  auto add = [&](const NewtonReport &other) {
+    before.edge_iterations += other.edge_iterations;
+    before.trials += other.trials;
+    before.shifts += other.shifts;
+    before.escapes += other.escapes;
+    before.first_negative_pivots = std::max(before.first_negative_pivots, other.first_negative_pivots);
+  };
+  bool solved = false;
+  if (fine && !coarse_first) {
+    PetscCall(block.solve(start, report, Seek::minimum, nullptr, patience));
+    solved = report->converged || report->lost;
+    if (!solved) before.iterations = report->iterations;
+    if (!solved) add(*report);
+  }
+  if (fine && !solved) {
+    for (int r = block.rods().begin; r < block.rods().end; ++r) potential_->beginRod(start, r);
+    Guess guess;
+    NewtonReport coarse;
+    PetscCall(solveCoarse(*potential_, start, block.rods(), &guess, &coarse));
+    add(coarse);
+    if (coarse.converged) {
+      PetscCall(block.solve(start, report, Seek::minimum, &guess));
+      solved = report->converged || report->lost;
+      if (!solved) before.iterations += report->iterations;
+      if (!solved) add(*report);
+    }
+  }
+  if (!solved) PetscCall(block.solve(start, report, Seek::minimum, nullptr));
+  report->iterations += before.iterations;
+  report->edge_iterations += before.edge_iterations;
+  report->trials += before.trials;
+  report->shifts += before.shifts;
+  report->escapes += before.escapes;
+  report->first_negative_pivots = std::max(report->first_negative_pivots, before.first_negative_pivots);
   PetscFunctionReturn(0);
 }
 

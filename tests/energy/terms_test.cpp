@@ -154,7 +154,7 @@ struct Bench {
     EXPECT_TRUE(potential().tryMove(d, scale, 0, RetractionKind::additive, trial));
     return potential().rodEnergy(trial, 0).value;
   }
-  NewtonReport solve(const Planes *guess = nullptr) {
+  NewtonReport solve(const Guess *guess = nullptr) {
     NewtonReport report;
     EXPECT_EQ(sim.solver.solve(sim.state, step, &report, Seek::minimum, guess), PetscErrorCode(0));
     EXPECT_TRUE(report.converged) << report.reason;
@@ -257,10 +257,11 @@ TEST(EveryTerm, LetsNewtonConvergeQuadratically) {
       SCOPED_TRACE(c.name + (mixed ? ", mixed" : ""));
       Bench bench(c, mixed);
       bench.solve();
-      Planes guess = bench.noise(3e-3, 3e-2), answer = bench.sim.dofs.makePlanes();
+      Guess guess{bench.noise(3e-3, 3e-2), {}};
+      Planes answer = bench.sim.dofs.makePlanes();
       bench.potential().coordinates(answer);
       for (int a = 0; a < slot_size; ++a)
-        for (int s = bench.rod().first_slot; s < bench.rod().vertexEnd(); ++s) guess[a][s] += answer[a][s];
+        for (int s = bench.rod().first_slot; s < bench.rod().vertexEnd(); ++s) guess.unknowns[a][s] += answer[a][s];
       const NewtonReport report = bench.solve(&guess);
       const std::vector<double> &r = report.history;
       std::string told;

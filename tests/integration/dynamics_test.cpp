@@ -268,7 +268,7 @@ TEST(StiffnessDamping, LeavesStaticsUnchanged) {
 }
 
 /// One step of a simulation from its state.
-NewtonReport oneStep(Simulation &sim, double dt, const Planes *guess = nullptr) {
+NewtonReport oneStep(Simulation &sim, double dt, const Guess *guess = nullptr) {
   Step step;
   step.dt = dt;
   step.time = sim.state.time + dt;
@@ -304,9 +304,9 @@ TEST(Newton, AnswerDoesNotDependOnTheFirstGuess) {
   State plain = sim.state, guessed = sim.state;
   sim.potential->commit(plain);
   Random random(7);
-  Planes guess = sim.dofs.makePlanes();
+  Guess guess{sim.dofs.makePlanes(), {}};
   for (const int s : sim.elements->vertex_slot)
-    for (int a = 0; a < slot_size; ++a) guess[a][s] = 2e-3 * random() * (a == 3 ? 100 : 1);
+    for (int a = 0; a < slot_size; ++a) guess.unknowns[a][s] = 2e-3 * random() * (a == 3 ? 100 : 1);
   const NewtonReport report = oneStep(sim, 0.02, &guess);
   EXPECT_GT(report.iterations, 2);
   sim.potential->commit(guessed);

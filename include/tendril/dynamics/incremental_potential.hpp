@@ -79,9 +79,12 @@ public:
   void accept(const Configuration &trial);
   /// Axial forces of a rod's iterate from its strains.
   void resetAxialForces(int rod);
+  /// Axial forces of a rod's iterate, over slots, where they are unknowns [N].
+  void setAxialForces(int rod, const double *force);
 
   /// Moves to where the unknowns are `x` (displacements and spins since the step began) by the additive retraction.
-  void moveTo(const Planes &x, RodSet rods);
+  /// \param supports whether supports that move go to the end of their motion, too
+  void moveTo(const Planes &x, RodSet rods, bool supports = false);
   /// Displacements and spins of the iterate since the step began.
   void coordinates(Planes &x, RodSet rods) const;
   void coordinates(Planes &x) const { coordinates(x, all()); }

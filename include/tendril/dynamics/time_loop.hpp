@@ -84,7 +84,7 @@ private:
   double nextStep(double time, double *landing) const;
   bool adapt(double h, double dt_min, const StepError &error);
   PetscErrorCode locate(State &start, const Step &step, bool *moved);
-  Planes alongMode(const State &start, const Step &step);
+  Guess alongMode(const State &start, const Step &step);
 };
 
 } // namespace tendril

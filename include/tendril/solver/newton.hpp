@@ -41,6 +41,12 @@ bool isAtNoise(const IncrementalPotential::Residual &residual, double rtol);
 /// Which equilibria are answers in statics: minima, or any, reached by Newton's own full steps, for following a branch.
 enum class Seek { minimum, equilibrium };
 
+/// Where Newton begins instead of at the start of a step.
+struct Guess {
+  Planes unknowns;    ///< displacements and spins since the start
+  Planes axial_force; ///< of edges [N], one plane, where supports are at the end of their motion, too; else empty
+};
+
 /// How Newton stands with a rod whose residual does not fall any more.
 struct Standstill {
   bool known = false;     ///< whether the last increment is Newton's own: no shift, no supports on the way
@@ -82,8 +88,9 @@ public:
   /// Creates SNES and its parts and reads -snes_*, -ksp_*, -pc_*, -mat_* options.
   PetscErrorCode setUp(IncrementalPotential &potential, NewtonWork &work, RodSet rods);
   /// Minimises the potential of the step, which has begun. The potential's iterate is the answer when `report` says converged.
-  /// \param guess displacements and spins to start from instead of the start state
-  PetscErrorCode solve(const State &start, NewtonReport *report, Seek seek, const Planes *guess);
+  /// \param guess where to begin instead of at the start state
+  /// \param patience iterations after which it fails; 0: as many as -snes_max_it
+  PetscErrorCode solve(const State &start, NewtonReport *report, Seek seek, const Guess *guess, int patience = 0);
   /// Sets up the linear solver with the matrix assembled last, for the mistakes in its options to come to light.
   PetscErrorCode setUpLinear();
   /// Factors the Hessian at the iterate and counts negative pivots; -1 when it cannot be factored.
@@ -120,6 +127,7 @@ private:
   PetscObjectState iterate_state_ = 0;     ///< ... and its state when they were written
   NewtonReport report_;
   Seek seek_ = Seek::minimum;
+  int patience_ = 0, spent_ = 0;    ///< iterations that the solve may take, 0: no bound; and those before SNES began
   double sharpness_ = 1, rtol_ = 0; ///< of -snes_rtol, and what is asked for now
   /// A step and what it changed of the gradient, by unknowns; per rod one over their product, 0 where that is not positive (BFGS).
   struct Secant {

@@ -18,8 +18,10 @@ class StepSolver {
 public:
   PetscErrorCode setUp(IncrementalPotential &potential, Coupling coupling = Coupling::none);
   /// Minimises the potential of the step. The potential's iterate is the answer when `report` says converged; iterations are the most of any block.
-  /// \param guess displacements and spins to start from instead of the start state
-  PetscErrorCode solve(const State &start, const Step &step, NewtonReport *report, Seek seek = Seek::minimum, const Planes *guess = nullptr);
+  /// In statics, where fine rods take many iterations, they begin again from the answer with fewer edges (solveCoarse).
+  /// \param guess where to begin instead of at the start state
+  PetscErrorCode solve(const State &start, const Step &step, NewtonReport *report, Seek seek = Seek::minimum, const Guess *guess = nullptr);
+  bool coarse_first = false; ///< whether fine rods begin from fewer edges without a try of their own
   /// Called with each block that has converged, while it is in the cache.
   std::function<void(RodSet)> on_block;
   /// Starts a step without solving it.
@@ -43,6 +45,7 @@ private:
   std::optional<NewtonWork> work_;
   std::deque<NewtonSolver> blocks_;
 
+  PetscErrorCode solveBlock(NewtonSolver &block, const State &start, NewtonReport *report);
   PetscErrorCode setUpBlocks(const std::vector<RodSet> &blocks);
 };
 
