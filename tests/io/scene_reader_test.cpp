@@ -192,8 +192,8 @@ TEST(SceneReader, Loads) {
 }
 
 TEST(SceneReader, ErrorsNameTheirLine) {
-  EXPECT_TRUE(
-      says(messageOf([] { read("gravity: [0, 0, 0]\nrods:\n  - name: a\n    " + bare + "\n    colour: red\n"); }), "scene.yaml:5: unknown key 'colour'"));
+  EXPECT_TRUE(says(messageOf([] { read("gravity: [0, 0, 0]\nrods:\n  - name: a\n    " + bare + "\n    material: default\n    colour: red\n"); }),
+                   "scene.yaml:6: unknown key 'colour'"));
   EXPECT_TRUE(says(messageOf([] { read("rods: [{" + line + "}]\n", {{"linear_density", "heavy"}}); }), "option -rod_linear_density: "));
 }
 
