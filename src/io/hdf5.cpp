@@ -90,13 +90,20 @@ std::vector<double> Hdf5File::read(const std::string &name, hsize_t columns) con
   if (!has(name)) throw SceneError(path_ + ": has no dataset '" + name + "'");
   const Hdf5Dataset data = checked(H5Dopen2(file_, name.c_str(), H5P_DEFAULT), path_ + ": '" + name + "' is not a dataset");
   const Hdf5Space space = H5Dget_space(data);
-  const hssize_t size = H5Sget_simple_extent_npoints(space);
   const int rank = H5Sget_simple_extent_ndims(space);
   std::vector<hsize_t> shape(std::max(rank, 1), 1);
   if (rank > 0) H5Sget_simple_extent_dims(space, shape.data(), nullptr);
   const bool fits = columns == 1 ? rank == 1 : rank == 2 && shape.back() == columns;
   if (!fits) throw SceneError(path_ + ": dataset '" + name + "' must have " + (columns == 1 ? "one dimension" : "shape (n, " + std::to_string(columns) + ")"));
-  std::vector<double> values(size);
+  // Rows that were declared but never written would be zeros. Compressed, a byte stands for a thousand at most.
+  constexpr hsize_t most_rows = 50'000'000, most_compressed = 1100;
+  if (shape[0] > most_rows)
+    throw SceneError(path_ + ": dataset '" + name + "' declares " + std::to_string(shape[0]) + " rows, at most " + std::to_string(most_rows) + " are read");
+  const hsize_t values_count = shape[0] * columns, stored = H5Dget_storage_size(data);
+  if (values_count / most_compressed > stored)
+    throw SceneError(path_ + ": dataset '" + name + "' declares " + std::to_string(shape[0]) + " rows, but the file holds only " + std::to_string(stored) +
+                     " bytes of them");
+  std::vector<double> values(values_count);
   checked(H5Dread(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), path_ + ": '" + name + "' does not hold numbers");
   for (const double v : values)
     if (!std::isfinite(v)) throw SceneError(path_ + ": dataset '" + name + "' holds a number that is not finite");

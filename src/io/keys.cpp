@@ -172,7 +172,8 @@ std::string blockSchema(const std::string &block) {
 std::string helpText() {
   std::ostringstream out;
   out << "tendril: elastic rods. Runs a scene and writes a trajectory.\n"
-         "  tendril -scene data/scenes/helix.yaml -dt 5e-3 -t_end 2 -output_dir out/helix\n";
+         "  tendril data/scenes/helix.yaml -dt 5e-3 -t_end 2 -output_dir out/helix\n"
+         "  tendril --help | --version\n";
   const std::pair<const char *, const char *> groups[] = {{"scene", "Scene"},       {"time", "Time, or load"}, {"solver", "Solver"}, {"rods", "Rods: for all of them"},
                                                           {"accuracy", "Accuracy"}, {"output", "Output"}};
   for (const auto &[group, title] : groups) {

@@ -1,5 +1,8 @@
 #include "tendril/io/material_reader.hpp"
 
+#include <algorithm>
+#include <sstream>
+
 namespace tendril {
 namespace {
 
@@ -58,9 +61,17 @@ Material readSection(MaterialReader &in) {
 
 } // namespace
 
-Material readMaterial(YamlMap &map, const Overrides &overrides) {
+MaterialRead readMaterial(YamlMap &rod, const Overrides &overrides) {
+  const std::vector<const Key *> rows = rodOverrides();
+  const bool by_options = std::any_of(rows.begin(), rows.end(),
+                                      [&](const Key *key) { return key->parent() == "rods[].material" && overrides.count(std::string(key->name())) > 0; });
+  const bool written = rod.has("rods[].material") || !by_options;
+  const YamlValue block = written ? rod.at("rods[].material") : YamlValue(YAML::Load("{}"), rod.value().file(), "material");
+  if (!block.isMap()) rod.word("rods[].material");
+  YamlMap map(block.isMap() ? block : YamlValue(YAML::Load("{}"), block.file(), "material"), "rods[].material");
   MaterialReader in(map, overrides);
-  Material m;
+  MaterialRead out;
+  Material &m = out.material;
   bool section = false;
   for (const AnyKey key :
        {AnyKey("rods[].material.radius"), AnyKey("rods[].material.radii"), AnyKey("rods[].material.width"), AnyKey("rods[].material.height"),
@@ -68,14 +79,28 @@ Material readMaterial(YamlMap &map, const Overrides &overrides) {
     section = in.has(key) || section;
   if (section) m = readSection(in);
   // The stiffness parameters; beside a section they replace what follows from it.
-  auto replace = [&](KeyOf<KeyType::number> key, double &value) {
-    if (in.has(*key)) value = in.number(key);
+  std::ostringstream defaults;
+  auto tell = [&](const Key &key, double value) {
+    if (!section) defaults << (defaults.tellp() > 0 ? ", " : "") << key.name() << " " << value << " " << key.unit;
   };
+  auto replace = [&](KeyOf<KeyType::number> key, double &value, bool counts = true) {
+    if (in.has(*key))
+      value = in.number(key);
+    else if (counts)
+      tell(*key, value);
+  };
+  const KeyOf<KeyType::pair> flexural("rods[].material.flexural_stiffness");
+  if (in.has(*flexural))
+    m.flexural_stiffness = in.pair(flexural);
+  else
+    tell(*flexural, m.flexural_stiffness[0]);
+  const bool twists = !m.isCable();
   replace("rods[].material.linear_density", m.linear_density);
-  replace("rods[].material.linear_rotational_inertia", m.linear_rotational_inertia);
+  replace("rods[].material.linear_rotational_inertia", m.linear_rotational_inertia, twists);
   replace("rods[].material.axial_stiffness", m.axial_stiffness);
-  replace("rods[].material.torsional_stiffness", m.torsional_stiffness);
-  if (in.has("rods[].material.flexural_stiffness")) m.flexural_stiffness = in.pair("rods[].material.flexural_stiffness");
+  replace("rods[].material.torsional_stiffness", m.torsional_stiffness, twists);
+  if (const std::string values = defaults.str(); !values.empty())
+    out.defaults = (block.isMap() ? "warning: the material is not complete, by default: " : "default material: ") + values;
   m.mass_damping_coefficient = in.number("rods[].material.mass_damping_coefficient");
   m.stiffness_damping_coefficient = in.number("rods[].material.stiffness_damping_coefficient");
   map.finish();
@@ -83,7 +108,9 @@ Material readMaterial(YamlMap &map, const Overrides &overrides) {
   for (const double v : {m.linear_density, m.axial_stiffness, 1 + m.linear_rotational_inertia, 1 + m.torsional_stiffness, 1 + m.flexural_stiffness[0],
                          1 + m.flexural_stiffness[1]})
     if (!(v > 0 && std::isfinite(v))) in.block().fail("the material's stiffness or density comes out as zero or infinite; check its numbers (SI units)");
-  return m;
+  if (twists && m.torsional_stiffness == 0 && m.linear_rotational_inertia == 0)
+    in.block().fail("'torsional_stiffness' and 'linear_rotational_inertia' are both zero: nothing resists turning about the axis; give one of them");
+  return out;
 }
 
 std::vector<const Key *> rodOverrides() {

@@ -1,5 +1,6 @@
 #include "tendril/io/option_files.hpp"
 
+#include "tendril/io/text.hpp"
 #include "tendril/io/yaml.hpp"
 
 #include <cctype>
@@ -43,12 +44,7 @@ void collect(const YamlValue &value, const std::string &prefix, Places &places) 
 } // namespace
 
 void OptionFiles::readYaml(const std::string &file) {
-  std::vector<YAML::Node> documents;
-  try {
-    documents = YAML::LoadAllFromFile(file);
-  } catch (const YAML::Exception &e) {
-    throw SceneError(file + ":" + std::to_string(e.mark.line + 1) + ": not valid YAML: " + e.msg);
-  }
+  const std::vector<YAML::Node> documents = loadYaml(readText(file, ": cannot be opened"), file);
   Places places;
   for (const YAML::Node &document : documents) {
     if (document.IsNull()) continue;

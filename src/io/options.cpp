@@ -117,6 +117,18 @@ private:
   }
 };
 
+/// n of all rods, or name:n with commas.
+std::vector<std::pair<std::string, int>> readRodEdges(const std::string &text) {
+  std::vector<std::pair<std::string, int>> edges;
+  std::istringstream in(text);
+  for (std::string word; std::getline(in, word, ',');) {
+    const std::size_t colon = word.rfind(':');
+    const YamlValue number(YAML::Node(colon == std::string::npos ? word : word.substr(colon + 1)), "option -rod_edges", "edges");
+    edges.emplace_back(colon == std::string::npos ? "all" : word.substr(0, colon), number.integer(*KeyOf<KeyType::integer>("rods[].line.edges")));
+  }
+  return edges;
+}
+
 std::set<std::string> readFields(const Texts &texts) {
   const auto &names = TrajectoryWriter::fieldNames(), &derived = TrajectoryWriter::derivedFieldNames();
   std::set<std::string> fields;
@@ -165,8 +177,7 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   if (texts.has("-dt_max")) o->loop.dt_max = texts.number("-dt_max");
   for (const char *name : {"dt_rtol", "dt_atol", "dt_max"})
     if (texts.isGiven(std::string("-") + name) && o->loop.adapt == Adaptation::none) fail(name, "needs -dt_adapt error");
-  for (const char *name : {"integrator", "dt_adapt"})
-    if (texts.isGiven(std::string("-") + name)) o->dynamic_only = name;
+  if (texts.has("-dt_adapt")) o->dynamic_only = "dt_adapt"; // -integrator may stay in statics, in sweeps over both
   if (texts.has("-load_steps")) o->given_load_steps = texts.integer("-load_steps");
   if (texts.has("-arclength_steps")) o->arclength_steps = texts.integer("-arclength_steps");
   o->loop.arclength_steps = texts.integer("-arclength_steps");
@@ -176,6 +187,7 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   o->loop.bifurcation = Bifurcation(std::find(bifurcations.begin(), bifurcations.end(), bifurcation) - bifurcations.begin());
   if (texts.has("-bifurcation")) o->bifurcation = o->loop.bifurcation;
   if (texts.has("-gravity")) o->gravity = texts.vector("-gravity");
+  o->rod_edges = readRodEdges(texts.text("-rod_edges"));
   o->output_dir = texts.text("-output_dir");
   o->output_interval = o->loop.output_interval = texts.number("-output_interval");
   o->checkpoint_interval = texts.integer("-checkpoint_interval");
@@ -212,6 +224,7 @@ void checkAccuracy(const Options &o) {
   if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength && (o.accuracy || o.error_estimate))
     fail(o.accuracy ? "accuracy" : "error_estimate", "needs -continuation load: paths of two resolutions have no states in common");
   if (o.accuracy && o.loop.bifurcation == Bifurcation::stop) fail("accuracy", "is that of the answer at full load; -bifurcation stop ends before");
+  if (o.accuracy && !o.rod_edges.empty()) fail("rod_edges", "gives the edges that -accuracy chooses; take one of the two away");
   if (o.accuracy && !o.restart.empty()) fail("accuracy", "chooses the edges, which a checkpoint already has; take -restart or -accuracy away");
 }
 
@@ -240,6 +253,18 @@ void resolve(const RunSettings &scene, Options &o) {
   }
   checkAccuracy(o);
   if (o.loop.dt_min > o.loop.dt) fail("dt_min", "must not be larger than the step " + std::to_string(o.loop.dt));
+}
+
+std::vector<int> edgesAsked(const Scene &scene, const Options &o) {
+  std::vector<int> edges = edgesOf(scene);
+  for (const auto &[name, number] : o.rod_edges) {
+    const std::vector<int> rods = rodsOf(scene.rods, name);
+    if (rods.empty())
+      fail("rod_edges",
+           "there is no rod '" + name + "'; write a name of the scene, a number from 0 to " + std::to_string(edges.size() - 1) + ", or edges alone for all");
+    for (const int r : rods) edges[r] = number;
+  }
+  return edges;
 }
 
 PetscErrorCode refuseUnknownOptions() {

@@ -1,9 +1,11 @@
 #include "tendril/io/polyline_reader.hpp"
 
 #include "tendril/io/hdf5.hpp"
+#include "tendril/io/text.hpp"
 #include "tendril/model/scene.hpp"
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -17,20 +19,20 @@ Vec3 parsePoint(std::istream &in, const std::string &path, int line, const std::
   Vec3 x;
   std::string word;
   for (int k = 0; k < 3; ++k) {
-    if (!(in >> word)) fail(path, line, "expected three numbers, found '" + text + "'");
+    if (!(in >> word)) fail(path, line, "expected three numbers, found " + excerpt(text));
     std::size_t used = 0;
     try {
       x[k] = std::stod(word, &used);
     } catch (const std::exception &) {
       used = 0;
     }
-    if (used != word.size()) fail(path, line, "'" + word + "' is not a number, found in '" + text + "'");
-    if (!std::isfinite(x[k])) fail(path, line, "'" + word + "' is not finite");
+    if (used != word.size()) fail(path, line, excerpt(word) + " is not a number, found in " + excerpt(text));
+    if (!std::isfinite(x[k])) fail(path, line, excerpt(word) + " is not finite");
   }
   return x;
 }
 
-std::vector<Polyline> readPoints(std::ifstream &file, const std::string &path) {
+std::vector<Polyline> readPoints(std::istream &file, const std::string &path) {
   std::vector<Polyline> lines(1);
   std::string text;
   auto endLine = [&](int number) {
@@ -47,7 +49,7 @@ std::vector<Polyline> readPoints(std::ifstream &file, const std::string &path) {
       continue;
     }
     lines.back().points.push_back(parsePoint(in, path, number, text));
-    if (std::string rest; in >> rest) fail(path, number, "expected three numbers, found more in '" + text + "'");
+    if (std::string rest; in >> rest) fail(path, number, "expected three numbers, found more in " + excerpt(text));
     last = number;
   }
   endLine(last);
@@ -55,9 +57,76 @@ std::vector<Polyline> readPoints(std::ifstream &file, const std::string &path) {
   return lines;
 }
 
-std::vector<Polyline> readObj(std::ifstream &file, const std::string &path) {
+/// Edges between numbered vertices as polylines: one that ends where it began is closed. A polyline stands where its first edge does, and runs its way.
+class Chains {
+public:
+  explicit Chains(std::string path) : path_(std::move(path)) {}
+
+  void add(int from, int to, int line) {
+    const int edge = int(edges_.size());
+    if (from == to) fail(path_, line, "an edge from vertex " + std::to_string(from + 1) + " to itself has no length");
+    for (const int v : {from, to}) {
+      if (std::size_t(v) >= edges_at_.size()) edges_at_.resize(std::size_t(v) + 1, {-1, -1});
+      auto &[first, second] = edges_at_[std::size_t(v)];
+      if (second >= 0)
+        fail(path_, line, "vertex " + std::to_string(v + 1) + " has a third edge here, and rods do not branch; give every rod vertices of its own");
+      (first < 0 ? first : second) = edge;
+    }
+    edges_.push_back({from, to});
+  }
+
+  std::vector<Polyline> polylines(const std::vector<Vec3> &vertices) const {
+    std::vector<Polyline> lines;
+    std::vector<bool> taken(edges_.size());
+    for (int edge = 0; edge < int(edges_.size()); ++edge) {
+      if (taken[std::size_t(edge)]) continue;
+      const auto [from, to] = edges_[std::size_t(edge)];
+      std::vector<int> before = walk(edge, from), behind = walk(edge, to);
+      Polyline &line = lines.emplace_back();
+      line.closed = behind.size() > 1 && behind.back() == edge; // came back to where it began
+      if (line.closed) before = {edge};
+      std::vector<int> order(before.rbegin(), before.rend());
+      order.insert(order.end(), behind.begin() + 1, behind.end());
+      if (line.closed) order.pop_back();
+      int vertex = from; // where the polyline begins
+      for (std::size_t k = 1; k < before.size(); ++k) vertex = otherEnd(before[k], vertex);
+      line.points.push_back(vertices[std::size_t(vertex)]);
+      for (const int e : order) {
+        taken[std::size_t(e)] = true;
+        vertex = otherEnd(e, vertex);
+        line.points.push_back(vertices[std::size_t(vertex)]);
+      }
+      if (line.closed) line.points.pop_back();
+    }
+    return lines;
+  }
+
+private:
+  std::string path_;
+  std::vector<std::array<int, 2>> edges_;    ///< their vertices
+  std::vector<std::array<int, 2>> edges_at_; ///< of a vertex, -1 where there is none
+
+  int otherEnd(int edge, int vertex) const {
+    const auto [a, b] = edges_[std::size_t(edge)];
+    return vertex == a ? b : a;
+  }
+  /// The edges from one on, over one of its vertices, to the end of the polyline or back to itself.
+  std::vector<int> walk(int edge, int vertex) const {
+    std::vector<int> way{edge};
+    for (int at = edge;;) {
+      const auto [a, b] = edges_at_[std::size_t(vertex)];
+      at = at == a ? b : a;
+      if (at < 0) return way;
+      way.push_back(at);
+      if (at == edge) return way;
+      vertex = otherEnd(at, vertex);
+    }
+  }
+};
+
+std::vector<Polyline> readObj(std::istream &file, const std::string &path) {
   std::vector<Vec3> vertices;
-  std::vector<Polyline> lines;
+  Chains chains(path);
   std::string text;
   for (int number = 1; std::getline(file, text); ++number) {
     std::istringstream in(text);
@@ -65,25 +134,19 @@ std::vector<Polyline> readObj(std::ifstream &file, const std::string &path) {
     in >> kind;
     if (kind == "v") vertices.push_back(parsePoint(in, path, number, text));
     if (kind != "l") continue;
-    Polyline line;
-    std::vector<int> index;
-    for (std::string word; in >> word;) {
+    int last = -1, count = 0;
+    for (std::string word; in >> word; ++count) {
       char *end; // of the vertex's number; a texture coordinate may follow
-      const long i = std::strtol(word.c_str(), &end, 10), count = long(vertices.size());
-      const long v = i < 0 ? count + i : i - 1;
-      if ((*end != 0 && *end != '/') || i == 0 || v < 0 || v >= count)
-        fail(path, number, "'" + word + "' is not one of the " + std::to_string(count) + " vertices above");
-      index.push_back(int(v));
+      const long i = std::strtol(word.c_str(), &end, 10), known = long(vertices.size());
+      const long v = i < 0 ? known + i : i - 1;
+      if ((*end != 0 && *end != '/') || i == 0 || v < 0 || v >= known)
+        fail(path, number, excerpt(word) + " is not one of the " + std::to_string(known) + " vertices above");
+      if (count > 0) chains.add(last, int(v), number);
+      last = int(v);
     }
-    if (index.size() < 2) fail(path, number, "a line needs at least two vertices, found '" + text + "'");
-    if (index.size() > 2 && index.front() == index.back()) {
-      line.closed = true;
-      index.pop_back();
-    }
-    for (const int v : index) line.points.push_back(vertices[v]);
-    lines.push_back(line);
+    if (count < 2) fail(path, number, "a line needs at least two vertices, found " + excerpt(text));
   }
-  return lines;
+  return chains.polylines(vertices);
 }
 
 std::vector<Polyline> readHdf5(const std::string &path) {
@@ -121,8 +184,9 @@ bool isTextPolyline(const std::string &path) { return extensionOf(path) != ".h5"
 
 std::vector<Polyline> readPolylines(const std::string &path) {
   const std::string extension = extensionOf(path);
-  std::ifstream file(path);
+  std::ifstream file(path, std::ios::binary);
   if (!file || std::filesystem::is_directory(path)) throw SceneError(path + ": cannot be opened; check the path (it is relative to the scene file)");
+  skipByteOrderMark(file);
   std::vector<Polyline> lines;
   if (extension == ".csv" || extension == ".txt")
     lines = readPoints(file, path);

@@ -1,5 +1,7 @@
 #include "tendril/io/progress.hpp"
 
+#include "tendril/io/text.hpp"
+
 #include <unistd.h>
 
 namespace tendril {
@@ -16,13 +18,13 @@ Progress::~Progress() {
 void Progress::say(const std::string &line) {
   if (open_line_) std::printf("\n");
   open_line_ = false;
-  std::printf("%s\n", line.c_str());
+  std::printf("%s\n", printable(line).c_str());
   std::fflush(stdout);
   log(line);
 }
 
 void Progress::log(const std::string &line) {
-  std::fprintf(log_, "%s\n", line.c_str());
+  std::fprintf(log_, "%s\n", printable(line).c_str());
   std::fflush(log_);
 }
 

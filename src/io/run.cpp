@@ -2,11 +2,13 @@
 
 #include "tendril/dynamics/arc_length.hpp"
 #include "tendril/dynamics/simulation.hpp"
+#include "tendril/energy/widest_angle.hpp"
 #include "tendril/io/checkpoint.hpp"
 #include "tendril/io/keys.hpp"
 #include "tendril/io/option_files.hpp"
 #include "tendril/io/options.hpp"
 #include "tendril/io/progress.hpp"
+#include "tendril/io/text.hpp"
 #include "tendril/solver/events.hpp"
 
 #include <algorithm>
@@ -48,6 +50,7 @@ std::string groupsText(const Scene &scene) {
   if (shown < scene.rods.size()) s << "... and " << scene.rods.size() - shown << " more rods\n";
   double turning = 0, twist = 0;
   for (const Rod &rod : scene.rods) {
+    if (rod.material.isCable()) continue; // free to fold
     const DimensionlessGroups g = dimensionlessGroups(rod, scene.gravity);
     turning = std::max(turning, g.largest_turning);
     twist = std::max(twist, g.largest_twist);
@@ -57,6 +60,14 @@ std::string groupsText(const Scene &scene) {
       << " degrees; above 30 the strains are more than 10 % off: use more edges\n";
   return s.str();
 }
+
+std::string petscVersion() {
+  char version[256];
+  (void)PetscGetVersion(version, sizeof version);
+  return version;
+}
+
+std::string versionText() { return std::string("tendril ") + TENDRIL_VERSION + " (" + TENDRIL_GIT_COMMIT + "), " + petscVersion(); }
 
 Provenance provenance(int argc, char **argv) {
   Provenance p;
@@ -69,9 +80,7 @@ Provenance provenance(int argc, char **argv) {
   (void)PetscFree(all);
   p.version = TENDRIL_VERSION;
   p.git_commit = TENDRIL_GIT_COMMIT;
-  char version[256];
-  (void)PetscGetVersion(version, sizeof version);
-  p.petsc_version = version;
+  p.petsc_version = petscVersion();
   const std::time_t now = std::time(nullptr);
   char stamp[32];
   std::strftime(stamp, sizeof stamp, "%Y-%m-%dT%H:%M:%SZ", std::gmtime(&now));
@@ -107,6 +116,7 @@ void requireHeld(const Scene &scene) {
 struct Prepared {
   std::unique_ptr<Simulation> run;
   SceneSource source;
+  std::vector<std::string> notes;
   Scene written;
   std::vector<Drawing> drawings;
 };
@@ -119,11 +129,21 @@ PetscErrorCode makeReady(Scene scene, const Options &o, std::unique_ptr<Simulati
   PetscFunctionReturn(0);
 }
 
+void redrawAsAsked(SceneFile &file, const Options &o) {
+  const std::vector<int> edges = edgesAsked(file.scene, o);
+  try {
+    file.scene = redraw(file.scene, file.drawings, edges);
+  } catch (const SceneError &e) {
+    throw SceneError(std::string("option -rod_edges: ") + e.what());
+  }
+}
+
 PetscErrorCode setUp(Prepared &prepared, Options &o) {
   PetscFunctionBeginUser;
   PetscCall(PetscLogStagePush(events().setup));
   SceneFile file = readScene(o.scene, o.overrides);
   prepared.source = std::move(file.source);
+  prepared.notes = std::move(file.notes);
   if (o.gravity) file.scene.gravity = *o.gravity;
   resolve(file.run, o);
   if (!o.loop.dynamic) requireHeld(file.scene);
@@ -137,9 +157,10 @@ PetscErrorCode setUp(Prepared &prepared, Options &o) {
       if (rod.closed) throw SceneError("option -accuracy_of: rod '" + rod.name + "' is closed and has no tip; use position");
   if (o.accuracy || (o.error_estimate && !o.loop.dynamic)) {
     prepared.written = file.scene;
-    prepared.drawings = std::move(file.drawings);
+    prepared.drawings = file.drawings;
     if (o.accuracy) grade(prepared.written, prepared.drawings);
   }
+  if (!o.rod_edges.empty()) redrawAsAsked(file, o);
   PetscCall(makeReady(std::move(file.scene), o, prepared.run));
   PetscCall(PetscLogStagePop());
   PetscFunctionReturn(0);
@@ -232,6 +253,7 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, int *exi
   progress.say(origin.command_line);
   std::istringstream groups(groupsText(run.scene));
   for (std::string line; std::getline(groups, line);) progress.say(line);
+  for (const std::string &note : prepared.notes) progress.say(note);
   for (const std::string &line : choice.lines) progress.log(line);
 
   auto writer = std::make_unique<TrajectoryWriter>(o.output_dir, run.scene, *run.elements, origin, o.fields, o.loop.dynamic);
@@ -244,6 +266,9 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, int *exi
   const std::string checkpoint = o.output_dir + "/checkpoint.h5";
   long steps = 0, iterations = 0, rejected = 0;
   bool warned = false;
+  WidestAngle widest{pi / 6};
+  widest.include(run.scene, *run.elements, run.state); // told above
+  widest.rod = -1;
   // Without couples, forces and motions nothing puts energy in: where it rises by a part of the motion's own, the method does. Weight is a potential.
   const bool closed = o.loop.dynamic && run.scene.forces.empty() && run.scene.moments.empty() && run.scene.rotation.angular_velocity.isZero(0) &&
                       std::none_of(run.scene.supports.begin(), run.scene.supports.end(), [](const Support &s) { return s.motion.moves(); });
@@ -264,6 +289,7 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, int *exi
     trajectory.writeDiagnostics(row);
     if (arclength || state.time >= next_output * (1 - 1e-12) || state.time >= o.loop.t_end) {
       trajectory.writeFrame(state);
+      widest.include(run.scene, *run.elements, state);
       while (o.output_interval > 0 && next_output <= state.time * (1 + 1e-12)) next_output += o.output_interval;
     }
     trajectory.flushWhenDue();
@@ -320,14 +346,22 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, int *exi
   progress.say(summary.str());
   if (closed && gained > 0.1 * most_kinetic + little) {
     std::ostringstream growth;
-    growth << "the energy rose by " << std::setprecision(2) << gained / most_kinetic << " of the largest kinetic energy, with nothing to put it in but -integrator "
-           << o.loop.integrator.name << " in steps too long for it: shorten -dt, or take bdf2 or energy_momentum";
+    growth << "the energy rose by " << std::setprecision(2) << gained / most_kinetic
+           << " of the largest kinetic energy, with nothing to put it in but -integrator " << o.loop.integrator.name
+           << " in steps too long for it: shorten -dt, or take bdf2 or energy_momentum";
     // A method that is unstable has made most of the motion itself.
     if (finished && gained > 0.5 * most_kinetic + little) {
       finished = false;
       failure = growth.str();
     } else
       progress.say("warning: " + growth.str());
+  }
+  if (widest.rod >= 0) {
+    std::ostringstream line;
+    line << "warning: neighbouring edges of rod '" << run.scene.rods[std::size_t(widest.rod)].name << "' came to turn or twist by up to " << std::setprecision(3)
+         << widest.angle * 180 / pi << " degrees, at vertex " << widest.vertex << " and " << (o.loop.dynamic ? "time " : "load factor ") << widest.time
+         << "; measure tan is stiffer than the rod above 30: use more edges, or -rod_measure angle";
+    progress.say(line.str());
   }
   if (last.rounding_error > 0) {
     std::ostringstream rounding;
@@ -336,7 +370,7 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, int *exi
   }
   if (!finished) {
     progress.say("failed: " + failure);
-    std::fprintf(stderr, "tendril: %s\n", failure.c_str());
+    std::fprintf(stderr, "tendril: %s\n", printable(failure).c_str());
     *exit_code = 2;
   }
   writer.reset();
@@ -347,9 +381,25 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, int *exi
 
 } // namespace
 
-int runMain(int argc, char **argv) {
+int runMain(int count, char **arguments) {
+  // A word that belongs to no option is the scene, where none is given.
+  std::vector<char *> words(arguments, arguments + count);
+  if (std::none_of(words.begin(), words.end(), [](const char *word) { return std::string_view(word) == "-scene"; }))
+    for (std::size_t i = 1; i < words.size(); ++i)
+      if (words[i][0] != '-' && (i == 1 || words[i - 1][0] != '-')) {
+        static char option[] = "-scene";
+        words.insert(words.begin() + std::ptrdiff_t(i), option);
+        break;
+      }
+  int argc = int(words.size());
+  words.push_back(nullptr);
+  char **argv = words.data();
   // Ours before PETSc's, which come only where solvers are set up for a scene.
   auto given = [&](const char *option) { return std::any_of(argv + 1, argv + argc, [&](const char *word) { return std::string_view(word) == option; }); };
+  if (given("--version")) {
+    std::puts(versionText().c_str());
+    return 0;
+  }
   if (given("-help") || given("-h") || given("--help")) {
     std::fputs(helpText().c_str(), stdout);
     std::fflush(stdout);
@@ -359,7 +409,7 @@ int runMain(int argc, char **argv) {
   try {
     files.read(argc, argv);
   } catch (const SceneError &e) {
-    std::fprintf(stderr, "tendril: %s\n", e.what());
+    std::fprintf(stderr, "tendril: %s\n", printable(e.what()).c_str());
     return 1;
   }
   if (PetscInitialize(&argc, &argv, nullptr, nullptr)) return 1;
@@ -376,7 +426,8 @@ int runMain(int argc, char **argv) {
   } catch (const std::exception &e) {
     int rank;
     MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
-    if (rank == 0) std::fprintf(stderr, "tendril: %s\n", files.locate(e.what()).c_str());
+    const std::string message = dynamic_cast<const std::bad_alloc *>(&e) ? "there is not enough memory for this scene" : files.locate(e.what());
+    if (rank == 0) std::fprintf(stderr, "tendril: %s\n", printable(message).c_str());
     exit_code = 1;
   }
   (void)PetscOptionsSetValue(nullptr, "-options_left", "no"); // checked before the first step, with better words

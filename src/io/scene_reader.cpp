@@ -1,6 +1,7 @@
 #include "tendril/io/scene_reader.hpp"
 
 #include "tendril/io/polyline_reader.hpp"
+#include "tendril/io/text.hpp"
 #include "tendril/io/yaml.hpp"
 #include "tendril/model/builders.hpp"
 
@@ -8,6 +9,8 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
+#include <sstream>
 
 namespace tendril {
 namespace {
@@ -133,15 +136,22 @@ std::string readName(YamlMap &map, const std::vector<Rod> &rods) {
   return name;
 }
 
-void readRod(const YamlValue &value, const Overrides &overrides, std::vector<Rod> &rods, std::vector<Drawing> &drawings) {
+/// Of all blocks of rods.
+struct Sums {
+  double vertices = 0;
+  std::map<std::string, std::vector<std::string>> defaults; ///< names of the blocks that take the same parameters by default
+};
+
+void readRod(const YamlValue &value, const Overrides &overrides, SceneFile &out, Sums &sums) {
+  std::vector<Rod> &rods = out.scene.rods;
   YamlMap map(value, "rods");
   const std::string name = readName(map, rods);
   std::vector<Polyline> shapes = readShape(map);
   if (map.has("rods[].place")) place(map.at("rods[].place"), shapes);
   Rod common;
-  // Options may say all that a material needs.
-  YamlMap material(map.has("rods[].material") ? map.at("rods[].material") : YamlValue(YAML::Load("{}"), value.file(), "material"), "rods[].material");
-  common.material = readMaterial(material, overrides);
+  const MaterialRead material = readMaterial(map, overrides);
+  common.material = material.material;
+  if (!material.defaults.empty()) sums.defaults[material.defaults].push_back(name);
   auto word = [&](KeyOf<KeyType::word, KeyType::word_or_map> key) { // of the scene, or of the option in its place
     const std::string written = map.word(key), name(key->name());
     const auto o = overrides.find(name);
@@ -162,9 +172,8 @@ void readRod(const YamlValue &value, const Overrides &overrides, std::vector<Rod
     offset = m.vector("rods[].copies.offset");
     m.finish();
   }
-  double vertices = 0;
-  for (const Polyline &shape : shapes) vertices += double(copies) * double(shape.points.size());
-  if (vertices > 1e8) value.fail("this makes " + std::to_string(std::int64_t(vertices)) + " vertices; a scene may have 1e8");
+  for (const Polyline &shape : shapes) sums.vertices += double(copies) * double(shape.points.size());
+  if (sums.vertices > 1e8) value.fail("this makes " + std::to_string(std::int64_t(sums.vertices)) + " vertices; a scene may have 1e8");
   for (const Polyline &shape : shapes)
     if (shape.closed && map.has("rods[].closed") && !closed) map.at("rods[].closed").fail("'closed: false' contradicts the shape, which is closed");
   for (int copy = 0; copy < copies; ++copy)
@@ -186,7 +195,7 @@ void readRod(const YamlValue &value, const Overrides &overrides, std::vector<Rod
         map.at("rods[].turns").fail("'turns' of a closed rod must be a whole number, or its ends do not meet");
       if (rod.material.isCable() && rod.initial_turns != 0) map.at("rods[].turns").fail("a rod without flexural stiffness has no twist");
       rods.push_back(rod);
-      Drawing &drawing = drawings.emplace_back();
+      Drawing &drawing = out.drawings.emplace_back();
       drawing.directors_given = map.has("rods[].directors");
       if (rod.closed == shapes[k].closed && shapes[k].curve) // a curve that `closed` closes by one more edge is points to us
         drawing.curve = [curve = shapes[k].curve, shift = Vec3(double(copy) * offset)](double s) { return Vec3(curve(s) + shift); };
@@ -196,16 +205,13 @@ void readRod(const YamlValue &value, const Overrides &overrides, std::vector<Rod
 
 /// Rods a support or load speaks of: a name, a number, or `all`.
 std::vector<int> readTargets(YamlMap &map, KeyOf<KeyType::rod> key, const std::vector<Rod> &rods) {
-  std::vector<int> found;
   if (!map.has(*key)) {
     if (rods.size() > 1) map.value().fail("say which 'rod' is meant: a name, a number from 0, or all");
     return {0};
   }
   const YamlValue v = map.at(*key);
   const std::string word = v.text();
-  for (std::size_t r = 0; r < rods.size(); ++r) {
-    if (word == "all" || isNamed(rods[r], word) || std::to_string(r) == word) found.push_back(int(r));
-  }
+  const std::vector<int> found = rodsOf(rods, word);
   if (found.empty()) v.fail("there is no rod '" + word + "'; write the name of a rod, its number from 0 to " + std::to_string(rods.size() - 1) + ", or all");
   return found;
 }
@@ -226,8 +232,7 @@ Motion readMotion(const YamlValue &value) {
   m.velocity = map.vector("supports[].motion.velocity");
   m.angular_velocity = map.vector("supports[].motion.angular_velocity");
   const bool steady = map.has("supports[].motion.velocity") || map.has("supports[].motion.angular_velocity"), table = map.has("supports[].motion.table");
-  if (!steady && !table)
-    value.fail("'motion' needs 'velocity' and/or 'angular_velocity', or a 'table'");
+  if (!steady && !table) value.fail("'motion' needs 'velocity' and/or 'angular_velocity', or a 'table'");
   if (table) {
     if (steady) value.fail("'motion' takes a 'table' or velocities, not both");
     for (const YamlValue &row : map.at("supports[].motion.table").items()) {
@@ -244,8 +249,19 @@ Motion readMotion(const YamlValue &value) {
   return m;
 }
 
-void readSupport(const YamlValue &value, Scene &scene) {
+/// A motion that is elsewhere at the start than the rod as drawn.
+std::string jumpOf(const Motion &motion, const std::string &rod) {
+  const double away = motion.displacementAt(0).norm(), turned = motion.rotationVectorAt(0).norm();
+  if (away == 0 && turned == 0) return {};
+  std::ostringstream s;
+  s << "the motion begins " << away << " m and " << turned << " rad away from rod '" << rod << "' as drawn, which jumps there in the first step";
+  return s.str();
+}
+
+void readSupport(const YamlValue &value, SceneFile &out) {
+  Scene &scene = out.scene;
   YamlMap map(value, "supports");
+  bool warned = false;
   const std::string type = map.word("supports[].type");
   for (const int r : readTargets(map, "supports[].rod", scene.rods)) {
     const Rod &rod = scene.rods[r];
@@ -282,17 +298,29 @@ void readSupport(const YamlValue &value, Scene &scene) {
       if (type == "fix_twist" && (!s.motion.velocity.isZero(0) || std::any_of(table.begin(), table.end(), travels)))
         motion.fail("fix_twist holds no position; take the displacement away or add a pin that moves");
     }
+    if (const std::string jump = jumpOf(s.motion, rod.name); !jump.empty() && !warned) {
+      out.notes.push_back("warning: " + value.place() + ": " + jump);
+      warned = true;
+    }
     scene.supports.push_back(s);
   }
   map.finish();
 }
 
-void readLoad(const YamlValue &value, Scene &scene) {
+void readLoad(const YamlValue &value, SceneFile &out) {
+  Scene &scene = out.scene;
   YamlMap map(value, "loads");
+  bool warned = false;
   for (const int r : readTargets(map, "loads[].rod", scene.rods)) {
     const Rod &rod = scene.rods[r];
     if (map.has("loads[].force")) {
-      scene.forces.push_back({r, readIndex(map, "loads[].vertex", rod.vertices(), rod.name), map.vector("loads[].force")});
+      const NodalForce &load = scene.forces.emplace_back(r, readIndex(map, "loads[].vertex", rod.vertices(), rod.name), map.vector("loads[].force"));
+      const bool held = std::any_of(scene.supports.begin(), scene.supports.end(),
+                                    [&](const Support &s) { return s.rod == r && s.vertex == load.vertex && s.holdsPosition(); });
+      if (held && !warned && !load.force.isZero(0))
+        out.notes.push_back("warning: " + value.place() + ": the force acts on vertex " + std::to_string(load.vertex) + " of rod '" + rod.name +
+                            "', which a support holds: it moves nothing");
+      warned = warned || held;
     } else if (map.has("loads[].torque") || map.has("loads[].moment")) {
       if (rod.material.isCable()) value.fail("rod '" + rod.name + "' has no flexural stiffness: it cannot carry a torque or moment");
       EdgeMoment m{r, readIndex(map, "loads[].edge", rod.edges(), rod.name), 0, Vec3::Zero()};
@@ -334,20 +362,21 @@ void keepFiles(const YamlValue &rods, SceneSource &source) {
 
 } // namespace
 
+std::vector<int> rodsOf(const std::vector<Rod> &rods, const std::string &word) {
+  std::vector<int> found;
+  for (std::size_t r = 0; r < rods.size(); ++r)
+    if (word == "all" || isNamed(rods[r], word) || std::to_string(r) == word) found.push_back(int(r));
+  return found;
+}
+
 SceneFile readScene(const std::string &path, const Overrides &overrides) {
-  YAML::Node root;
   SceneFile out;
-  try {
-    if (std::filesystem::is_directory(path)) throw SceneError(path + ": is a folder; give a scene file with -scene");
-    out.source.text = contentOf(path, ": cannot be opened; give an existing scene file with -scene");
-    const std::vector<YAML::Node> documents = YAML::LoadAll(out.source.text);
-    if (documents.empty() || documents[0].IsNull()) throw SceneError(path + ":1: is empty; a scene needs at least 'rods'");
-    if (documents.size() > 1) throw SceneError(path + ":" + std::to_string(documents[1].Mark().line + 1) + ": a second document begins here; a scene is one");
-    root = documents[0];
-  } catch (const YAML::Exception &e) {
-    throw SceneError(path + ":" + std::to_string(e.mark.line + 1) + ": not valid YAML: " + e.msg);
-  }
-  YamlMap map(YamlValue(root, path, "scene"));
+  if (std::filesystem::is_directory(path)) throw SceneError(path + ": is a folder; give a scene file with -scene");
+  out.source.text = readText(path, ": cannot be opened; give an existing scene file with -scene");
+  const std::vector<YAML::Node> documents = loadYaml(out.source.text, path);
+  if (documents.empty() || documents[0].IsNull()) throw SceneError(path + ":1: is empty; a scene needs at least 'rods'");
+  if (documents.size() > 1) throw SceneError(path + ":" + std::to_string(documents[1].Mark().line + 1) + ": a second document begins here; a scene is one");
+  YamlMap map(YamlValue(documents[0], path, "scene"));
   out.scene.gravity = map.vector("gravity");
   if (map.has("rotation")) {
     YamlMap rotation(map.at("rotation"), "rotation");
@@ -356,12 +385,15 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
     rotation.finish();
   }
   readRun(map.has("simulation") ? map.at("simulation") : YamlValue(YAML::Load("{}"), path, "simulation"), out.run);
-  for (const YamlValue &v : map.at("rods").items()) readRod(v, overrides, out.scene.rods, out.drawings);
+  Sums sums;
+  for (const YamlValue &v : map.at("rods").items()) readRod(v, overrides, out, sums);
+  for (const auto &[values, names] : sums.defaults)
+    out.notes.push_back(values + " (rod '" + names[0] + "'" + (names.size() > 1 ? " and " + std::to_string(names.size() - 1) + " more" : "") + ")");
   if (out.scene.rods.empty()) map.at("rods").fail("a scene needs at least one rod");
   if (map.has("supports"))
-    for (const YamlValue &v : map.at("supports").items()) readSupport(v, out.scene);
+    for (const YamlValue &v : map.at("supports").items()) readSupport(v, out);
   if (map.has("loads"))
-    for (const YamlValue &v : map.at("loads").items()) readLoad(v, out.scene);
+    for (const YamlValue &v : map.at("loads").items()) readLoad(v, out);
   map.finish();
   keepFiles(map.at("rods"), out.source);
   return out;

@@ -5,9 +5,62 @@
 #include <map>
 #include <numeric>
 #include <sstream>
+#include <yaml-cpp/eventhandler.h>
 
 namespace tendril {
 namespace {
+
+/// Reads a text ahead of yaml-cpp's nodes and ends it by an exception where they would take too much, or never end.
+class Guard : public YAML::EventHandler {
+public:
+  void OnDocumentStart(const YAML::Mark &mark) override {
+    if (mark.pos <= end_) throw YAML::ParserException(mark, "what stands here belongs to nothing");
+    end_ = mark.pos;
+  }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark &mark, YAML::anchor_t anchor) override { value(mark, anchor); }
+  void OnScalar(const YAML::Mark &mark, const std::string &, YAML::anchor_t anchor, const std::string &) override { value(mark, anchor); }
+  void OnAlias(const YAML::Mark &mark, YAML::anchor_t anchor) override {
+    for (const Block &block : open_)
+      if (block.anchor == anchor) throw YAML::ParserException(mark, "an alias of what it stands in");
+    count(mark, sizes_[anchor]);
+  }
+  void OnSequenceStart(const YAML::Mark &mark, const std::string &, YAML::anchor_t anchor, YAML::EmitterStyle::value) override { begin(mark, anchor); }
+  void OnSequenceEnd() override { end(); }
+  void OnMapStart(const YAML::Mark &mark, const std::string &, YAML::anchor_t anchor, YAML::EmitterStyle::value) override { begin(mark, anchor); }
+  void OnMapEnd() override { end(); }
+
+private:
+  struct Block {
+    YAML::anchor_t anchor;
+    double before; ///< values
+  };
+  std::vector<Block> open_;
+  std::map<YAML::anchor_t, double> sizes_; ///< values of what an anchor stands for
+  double values_ = 0;
+  int end_ = -1; ///< place of the last event
+
+  void count(const YAML::Mark &mark, double values) {
+    constexpr double most = 5e6;
+    values_ += values;
+    end_ = std::max(end_, mark.pos);
+    if (values_ > most) throw YAML::ParserException(mark, "more than 5 million values; write points into a polyline file");
+  }
+  void value(const YAML::Mark &mark, YAML::anchor_t anchor) {
+    count(mark, 1);
+    if (anchor != YAML::NullAnchor) sizes_[anchor] = 1;
+  }
+  void begin(const YAML::Mark &mark, YAML::anchor_t anchor) {
+    constexpr std::size_t deepest = 32;
+    if (open_.size() == deepest) throw YAML::ParserException(mark, "more than 32 maps and lists in each other");
+    open_.push_back({anchor, values_});
+    count(mark, 1);
+  }
+  void end() {
+    if (open_.back().anchor != YAML::NullAnchor) sizes_[open_.back().anchor] = values_ - open_.back().before;
+    open_.pop_back();
+  }
+};
 
 std::string describe(const YAML::Node &node) {
   if (node.IsNull()) return "nothing";
@@ -49,12 +102,24 @@ std::string closest(const std::string &word, const std::vector<std::string> &can
   return best;
 }
 
-void YamlValue::fail(const std::string &message) const {
-  std::ostringstream s;
-  s << file_;
-  if (file_.rfind("option ", 0) != 0 && node_.IsDefined() && node_.Mark().line >= 0) s << ":" << node_.Mark().line + 1;
-  throw SceneError(s.str() + ": " + message);
+std::vector<YAML::Node> loadYaml(const std::string &text, const std::string &file) {
+  try {
+    std::istringstream in(text);
+    YAML::Parser parser(in);
+    Guard guard;
+    while (parser.HandleNextDocument(guard)) {}
+    return YAML::LoadAll(text);
+  } catch (const YAML::Exception &e) {
+    throw SceneError(file + ":" + std::to_string(e.mark.line + 1) + ": not valid YAML: " + e.msg);
+  }
 }
+
+std::string YamlValue::place() const {
+  const bool has_line = file_.rfind("option ", 0) != 0 && node_.IsDefined() && node_.Mark().line >= 0;
+  return has_line ? file_ + ":" + std::to_string(node_.Mark().line + 1) : file_;
+}
+
+void YamlValue::fail(const std::string &message) const { throw SceneError(place() + ": " + message); }
 
 double YamlValue::number() const {
   double value;
@@ -65,8 +130,12 @@ double YamlValue::number() const {
 
 int YamlValue::integer() const {
   int value;
-  if (!node_.IsScalar() || !YAML::convert<int>::decode(node_, value)) fail("'" + name_ + "' must be a whole number, found " + describe(node_));
-  return value;
+  if (node_.IsScalar() && YAML::convert<int>::decode(node_, value)) return value;
+  double number; // as 1e3, or beyond int
+  if (!node_.IsScalar() || !YAML::convert<double>::decode(node_, number) || number != std::floor(number))
+    fail("'" + name_ + "' must be a whole number, found " + describe(node_));
+  if (!(std::abs(number) <= std::numeric_limits<int>::max())) fail("'" + name_ + "' is too large, found " + describe(node_));
+  return int(number);
 }
 
 double YamlValue::number(const Key &key) const {
@@ -79,7 +148,7 @@ int YamlValue::integer(const Key &key) const {
   const int value = integer();
   constexpr int most = 10'000'000; // of anything that is counted
   if (const std::string wrong = outOfBounds(key, value); !wrong.empty()) fail("'" + name_ + "' " + wrong + ", found " + describe(node_));
-  if (value > most) fail("'" + name_ + "' must be at most " + std::to_string(most) + ", found " + describe(node_));
+  if (value > most) fail("'" + name_ + "' is too large: at most " + std::to_string(most) + ", found " + describe(node_));
   return value;
 }
 
@@ -166,7 +235,9 @@ YamlValue YamlMap::at(const Key &key) {
   for (const auto &entry : value_.node())
     if (!asked_.count(entry.first.Scalar())) others.push_back(entry.first.Scalar());
   const std::string near = closest(name, others);
-  value_.fail("'" + value_.name() + "' needs the key '" + name + "'" + (near.empty() ? "" : ", found '" + near + "'"));
+  const std::string choices = join(choicesOf(key)), what = key.type == KeyType::word_or_map ? "a map, or " + choices : choices;
+  value_.fail("'" + value_.name() + "' needs the key '" + name + "'" + (what.empty() ? "" : " (" + what + ")") +
+              (near.empty() ? "" : ", found '" + near + "'"));
 }
 
 void YamlMap::finish() const {
@@ -177,7 +248,8 @@ void YamlMap::finish() const {
     const std::string name = entry.first.Scalar();
     if (asked_.count(name)) continue;
     const YamlValue key(entry.first, value_.file(), name);
-    if (std::find(allowed.begin(), allowed.end(), name) != allowed.end()) key.fail("the key '" + name + "' has no meaning in this '" + value_.name() + "'; take it away");
+    if (std::find(allowed.begin(), allowed.end(), name) != allowed.end())
+      key.fail("the key '" + name + "' has no meaning in this '" + value_.name() + "'; take it away");
     const std::string near = closest(name, allowed);
     key.fail("unknown key '" + name + "' in '" + value_.name() + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") + " Allowed: " + join(allowed));
   }

@@ -43,6 +43,11 @@ Rod redrawn(const Rod &written, const Drawing &drawing, int edges) {
   Rod rod = written;
   const Grading *grading = drawing.grading.get();
   const Curve curve = drawing.curve ? drawing.curve : grading ? splineThrough(written) : curveThrough(written);
+  if (!drawing.curve && !grading)
+    for (std::int64_t v = 0; v < written.vertices(); ++v)
+      if (v * edges % written.edges() != 0 && isCorner(written, int(v)))
+        throw SceneError("rod '" + written.name + "': the corner at its vertex " + std::to_string(v) + " of " + std::to_string(written.edges()) +
+                         " edges is no vertex of " + std::to_string(edges));
   rod.position.clear();
   for (int i = 0; i < edges + (rod.closed ? 0 : 1); ++i) rod.position.push_back(curve(grading ? grading->parameterAt(double(i) / edges) : double(i) / edges));
   checkRod(rod);

@@ -43,6 +43,12 @@ files = {
     "index.obj": b"v 0 0 0\nv 1 0 0\nl 1 3\n",
     "word.obj": b"v 0 0 0\nv 1 0 0\nl 1 2x\n",
     "alone.obj": b"v 0 0 0\nl 1\n",
+    "branch.obj": b"v 0 0 0\nv 1 0 0\nv 2 0 0\nv 1 1 0\nl 1 2\nl 2 3\nl 2 4\n",
+    "loop.obj": b"v 0 0 0\nv 1 0 0\nl 1 1\n",
+    "comma.yaml": b",\n",
+    "comma_list.yaml": b"[1],",
+    "deep.yaml": b"[" * 5000,
+    "alias.yaml": b"rods: &a [*a]\n",
     "points.obj": b"v 0 0 0\nv 1 0 0\n",
     "text.h5": b"no HDF5\n",
     "broken.yaml": b"dt: [1\n",
@@ -70,11 +76,17 @@ def writeHdf5(folder):
         ("flat.h5", {"position": [0.0, 1, 2, 3]}),
         ("nan.h5", {"position": [[0.0, 0, 0], [1, 0, float("nan")]]}),
         ("offsets.h5", {"position": [[0.0, 0, 0], [1, 0, 0]], "rod_vertex_offsets": [0, 5]}),
+        ("words.h5", {"position": [["a", "b", "c"]]}),
         ("closed.h5", {"position": [[0.0, 0, 0], [1, 0, 0]], "closed": [0, 1]}),
     ):
         with h5py.File(f"{folder}/{name}", "w") as f:
             for key, values in datasets.items():
                 f[key] = values
+    for name, rows_declared in (("huge.h5", 10**12), ("hollow.h5", 20_000_000)):
+        with h5py.File(f"{folder}/{name}", "w") as f:
+            f.create_dataset("position", shape=(rows_declared, 3), dtype="f8", chunks=(1000, 3))
+    with open(f"{folder}/large.yaml", "wb") as f:
+        f.truncate(65_000_000)
 
 
 def rod(shape_text):
@@ -136,7 +148,7 @@ rows = [
     ("retraction unknown", None, ["-retraction", "none"], ["-retraction", "additive, length"]),
     ("hessian unknown", None, ["-hessian", "newton"], ["-hessian", "exact, gauss_newton"]),
     ("integrator unknown", None, ["-integrator", "bdf4"], ["-integrator", "euler, bdf2, bdf3, sdirk2, sdirk23, sdirk33, midpoint, symplectic2, energy_momentum, generalized_alpha", "bdf2"]),
-    ("integrator in statics", None, ["-mode", "static", "-integrator", "bdf2"], ["-integrator", "static"]),
+    ("adapted steps in statics", None, ["-mode", "static", "-dt_adapt", "error"], ["-dt_adapt", "static"]),
     ("rho_inf too large", None, ["-integrator", "generalized_alpha", "-rho_inf", "2"], ["-rho_inf", "[0, 1]"]),
     ("rho_inf of another method", None, ["-rho_inf", "0.5"], ["-rho_inf", "generalized_alpha"]),
     ("rounding tolerance of nothing", None, ["-rounding_tolerance", "0"], ["-rounding_tolerance", "(0, 1)"]),
@@ -164,8 +176,15 @@ rows = [
     ("scene is a list", None, ["-scene", "list.yaml"], ["list.yaml:1", "must be a map", "a list of 2"]),
     ("scene is a folder", None, ["-scene", "."], [".: is a folder", "-scene"]),
     ("two documents", None, ["-scene", "two.yaml"], ["two.yaml:10", "second document"]),
-    ("binary scene", None, ["-scene", "binary.yaml"], ["binary.yaml:"]),
-    ("Latin letters", None, ["-scene", "latin.yaml"], ["latin.yaml:1"]),
+    ("binary scene", None, ["-scene", "binary.yaml"], ["binary.yaml:1", "0x00 is no text", "UTF-8"]),
+    ("Latin letters", None, ["-scene", "latin.yaml"], ["latin.yaml:1", "0xE4 is no text", "UTF-8"]),
+    ("a comma", None, ["-scene", "comma.yaml"], ["comma.yaml:1", "not valid YAML"]),
+    ("a comma behind a list", None, ["-scene", "comma_list.yaml"], ["comma_list.yaml:1", "not valid YAML"]),
+    ("lists within lists", None, ["-scene", "deep.yaml"], ["deep.yaml:1", "more than 32"]),
+    ("an alias of itself", None, ["-scene", "alias.yaml"], ["alias.yaml:1", "alias"]),
+    ("a scene of 65 MB", None, ["-scene", "large.yaml"], ["large.yaml", "64000000", "polyline files"]),
+    ("escape sequence in a scene", ("type: clamp", 'type: "\\e[2J"'), [], ["scene.yaml:8", "'\\x1B[2J'"]),
+    ("escape sequence in an option", None, ["-rod_edges", "\x1b[2J:3"], ["-rod_edges", "'\\x1B[2J'"]),
     ("key twice", ("gravity:", "gravity: [0, 0, 0]\ngravity:"), [], ["scene.yaml:2", "'gravity'", "second time", "line 1"]),
     ("key twice in a rod", ("name: a", "name: a\n    name: b"), [], ["scene.yaml:5", "'name'", "second time"]),
     ("tab for blanks", ("  - name", "\t- name"), [], ["scene.yaml:4", "not valid YAML"]),
@@ -179,7 +198,7 @@ rows = [
     # names
     ("name twice", ("supports:", "  - name: a\n    " + shape + "\nsupports:"), [], ["scene.yaml:7", "a rod 'a' already"]),
     ("name is a number", ("name: a", "name: 1"), [], ["scene.yaml:4", "must not be empty, a number"]),
-    ("rod not said", ("supports:", "  - name: b\n    " + shape + "\nsupports:"), [], ["scene.yaml:10", "which 'rod'"]),
+    ("rod not said", ("supports:", "  - name: b\n    material: default\n    " + shape + "\nsupports:"), [], ["scene.yaml:11", "which 'rod'"]),
     ("support of rod 3", (support, "  - {rod: 3, vertex: 0, type: pin}"), [], ["scene.yaml:8", "no rod '3'", "0 to 0"]),
     # numbers
     ("number too large to read", ("1e7", "1e400"), [], ["scene.yaml:6", "'young' must be a number", "1e400"]),
@@ -188,13 +207,29 @@ rows = [
     ("point too far", rod("points: [[0, 0, 0], [1e200, 0, 0]]"), [], ["scene.yaml:4", "edge 0", "too long"]),
     ("no edges", ("edges: 4", "edges: 0"), [], ["scene.yaml:5", "'edges' must be at least 1", "'0'"]),
     ("half an edge", ("edges: 4", "edges: 4.5"), [], ["scene.yaml:5", "whole number", "4.5"]),
-    ("too many edges", ("edges: 4", "edges: 2000000000"), [], ["scene.yaml:5", "at most 10000000"]),
+    ("too many edges", ("edges: 4", "edges: 2000000000"), [], ["scene.yaml:5", "too large", "at most 10000000"]),
+    ("far too many edges", ("edges: 4", "edges: 1e12"), [], ["scene.yaml:5", "'edges' is too large"]),
     ("negative step in the scene", ("dt: 0.01", "dt: -0.01"), [], ["scene.yaml:2", "'dt'", "greater than zero"]),
     ("unknown mode in the scene", ("dt: 0.01", "mode: quick, dt: 0.01"), [], ["scene.yaml:2", "dynamic, static", "quick"]),
     ("zero radius", ("radius: 0.01", "radius: 0"), [], ["scene.yaml:6", "'radius' must be greater than zero"]),
     ("negative bending stiffness", ("poisson: 0.3", "poisson: 0.3, flexural_stiffness: [1, -1]"), [], ["scene.yaml:6", "flexural_stiffness", "negative"]),
     ("negative damping", ("poisson: 0.3", "poisson: 0.3, mass_damping_coefficient: -1"), [], ["scene.yaml:6", "mass_damping_coefficient", "negative"]),
+    ("nothing resists turning", ("radius: 0.01, young: 1e7, poisson: 0.3, density: 1000", "torsional_stiffness: 0, linear_rotational_inertia: 0"), [],
+     ["scene.yaml:6", "both zero"]),
+    ("zero axial stiffness", ("poisson: 0.3", "poisson: 0.3, axial_stiffness: 0"), [], ["scene.yaml:6", "'axial_stiffness' must be greater than zero"]),
+    ("negative torsional stiffness", ("poisson: 0.3", "poisson: 0.3, torsional_stiffness: -1"), [], ["scene.yaml:6", "torsional_stiffness", "negative"]),
+    ("zero mass", ("poisson: 0.3", "poisson: 0.3, linear_density: 0"), [], ["scene.yaml:6", "'linear_density' must be greater than zero"]),
+    ("negative rotational inertia", ("poisson: 0.3", "poisson: 0.3, linear_rotational_inertia: -1"), [], ["scene.yaml:6", "linear_rotational_inertia", "negative"]),
+    ("damping that is not finite", ("poisson: 0.3", "poisson: 0.3, stiffness_damping_coefficient: .inf"), [], ["scene.yaml:6", "finite"]),
+    ("three bending stiffnesses", ("poisson: 0.3", "poisson: 0.3, flexural_stiffness: [1, 2, 3]"), [], ["scene.yaml:6", "a list of 2 numbers", "a list of 3"]),
+    ("no material", ("    material: {radius: 0.01, young: 1e7, poisson: 0.3, density: 1000}\n", ""), [], ["scene.yaml:4", "needs the key 'material'", "a map, or default"]),
+    ("material of a name", ("{radius: 0.01, young: 1e7, poisson: 0.3, density: 1000}", "steel"), [], ["scene.yaml:6", "one of default", "'steel'"]),
+    ("material misspelt", ("material:", "matrial:"), [], ["scene.yaml:4", "needs the key 'material'", "found 'matrial'"]),
     # shapes
+    ("directors that are no directions", (shape, shape + "\n    directors: [[0, 1, 0], [0, 0, 0], [0, 1, 0], [0, 1, 0]]"), [], ["scene.yaml:6", "must not be zero"]),
+    ("director that is not finite", (shape, shape + "\n    director: [0, .nan, 0]"), [], ["scene.yaml:6", "finite"]),
+    ("too many directors", (shape, shape + "\n    directors: [[0, 1, 0], [0, 1, 0], [0, 1, 0], [0, 1, 0], [0, 1, 0]]"), [], ["scene.yaml:6", "one vector per edge (4), found 5"]),
+    ("velocity that is not finite", (shape, shape + "\n    velocity: [0, .inf, 0]"), [], ["scene.yaml:6", "finite"]),
     ("two shapes", rod(shape + "\n    ring: {radius: 1, edges: 8}"), [], ["scene.yaml:4", "exactly one shape", "found 2"]),
     ("one point", rod("points: [[0, 0, 0]]"), [], ["scene.yaml:4", "1 vertices", "at least 2"]),
     ("points in a plane", rod("points: [[0, 0], [1, 0]]"), [], ["scene.yaml:5", "list of 3 numbers", "a list of 2"]),
@@ -230,6 +265,11 @@ rows = [
     ("HDF5 of one dimension", rod("file: flat.h5"), [], ["flat.h5", "'position'", "(n, 3)"]),
     ("NaN in HDF5", rod("file: nan.h5"), [], ["nan.h5", "'position'", "not finite"]),
     ("HDF5 offsets", rod("file: offsets.h5"), [], ["offsets.h5", "rise from 0 to 2"]),
+    ("HDF5 of 1e12 rows", rod("file: huge.h5"), [], ["scene.yaml:5", "huge.h5", "'position' declares 1000000000000 rows", "50000000"]),
+    ("HDF5 of 2e7 rows that are not there", rod("file: hollow.h5"), [], ["hollow.h5", "declares 20000000 rows", "holds only 0 bytes"]),
+    ("HDF5 of words", rod("file: words.h5"), [], ["words.h5", "'position'"]),
+    ("branch in obj", rod("file: branch.obj"), [], ["scene.yaml:5", "branch.obj:7", "vertex 2 has a third edge", "do not branch"]),
+    ("edge of one vertex in obj", rod("file: loop.obj"), [], ["loop.obj:3", "vertex 1 to itself"]),
     ("HDF5 closed", rod("file: closed.h5"), [], ["closed.h5", "'closed'", "one number per rod"]),
     ("placed: nowhere", (shape, shape + "\n    place: {scale: 0}"), [], ["scene.yaml:", "greater than zero"]),
     ("placed: three scales", (shape, shape + "\n    place: {scale: [1, 2, 3]}"), [], ["scene.yaml:", "'scale' must be a number", "a list of 3"]),
@@ -256,6 +296,11 @@ rows = [
     ("load of nothing", (support, support + "\nloads:\n  - {vertex: 0}"), [], ["scene.yaml:10", "'force'"]),
     ("force on no vertex", (support, support + "\nloads:\n  - {vertex: 5, force: [0, 0, 1]}"), [], ["scene.yaml:10", "out of range"]),
     ("torque on no edge", (support, support + "\nloads:\n  - {edge: 4, torque: 1}"), [], ["scene.yaml:10", "out of range", "0 to 3"]),
+    ("force that is not finite", (support, support + "\nloads:\n  - {vertex: 4, force: [0, .nan, 1]}"), [], ["scene.yaml:10", "finite"]),
+    ("couple on a vertex", (support, support + "\nloads:\n  - {vertex: 4, torque: 1}"), [], ["scene.yaml:10", "'edge'"]),
+    ("force of two numbers", (support, support + "\nloads:\n  - {vertex: 4, force: [0, 1]}"), [], ["scene.yaml:10", "a list of 3 numbers"]),
+    ("motion that is not finite", motion("{velocity: [.inf, 0, 0]}"), [], ["scene.yaml:8", "finite"]),
+    ("table that is not finite", motion("{table: [[0, 0, 0, .nan]]}"), [], ["scene.yaml:8", "finite"]),
     ("force and torque at once", (support, support + "\nloads:\n  - {vertex: 4, force: [0, 0, 1], torque: 1}"), [], ["scene.yaml:10", "torque"]),
     # options
     ("folder is a file", None, ["-output_dir", "file"], ["-output_dir", "'file'", "cannot be written"]),
@@ -294,7 +339,17 @@ rows = [
     ("accuracy at a critical load", None, ["-mode", "static", "-accuracy", "1e-3", "-bifurcation", "stop"], ["-accuracy", "-bifurcation stop"]),
     ("accuracy along a path", None, ["-mode", "static", "-accuracy", "1e-3", "-continuation", "arclength"], ["-accuracy", "-continuation load"]),
     ("accuracy of a restart", None, ["-mode", "static", "-accuracy", "1e-3", "-restart", "file"], ["-accuracy", "-restart"]),
+    ("edges of no rod", None, ["-rod_edges", "b:20"], ["-rod_edges", "no rod 'b'"]),
+    ("half an edge by option", None, ["-rod_edges", "4.5"], ["-rod_edges", "whole number", "'4.5'"]),
+    ("no edges by option", None, ["-rod_edges", "a:0"], ["-rod_edges", "at least 1"]),
+    ("edges between which a load acts", (support, support + "\nloads:\n  - {vertex: 1, force: [0, 0, 1]}"), ["-rod_edges", "6"], ["-rod_edges", "vertex 1 of 4 edges is no vertex of 6"]),
+    ("edges that cut a corner", rod("points: [[0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 2, 0]]"), ["-rod_edges", "4"], ["-rod_edges", "corner at its vertex 1"]),
+    ("ring of two edges", rod("ring: {radius: 1, edges: 8}"), ["-rod_edges", "2"], ["-rod_edges", "at least 3"]),
+    ("edges and accuracy", None, ["-accuracy", "1e-3", "-rod_edges", "8"], ["-rod_edges", "-accuracy"]),
+    ("two scenes", None, ["other.yaml"], ["'other.yaml' belongs to no option"]),
     # files of options
+    ("options: a comma", None, ["-options_file", "comma.yaml"], ["comma.yaml:1", "not valid YAML"]),
+    ("options: Latin letters", None, ["-options_file", "latin.yaml"], ["latin.yaml:1", "0xE4"]),
     ("options: no file", None, ["-options_file"], ["-options_file", "needs a file"]),
     ("options: missing file", None, ["-options_file", "nowhere.yaml"], ["nowhere.yaml", "cannot be opened"]),
     ("options: folder", None, ["-options_file", "."], ["-options_file", "is a folder"]),
@@ -339,6 +394,8 @@ def check(row):
         wrong = [p for p in parts if p not in run.stderr]
         if run.returncode != 1:
             wrong.append(f"exit code {run.returncode}")
+        if any(ord(c) < 32 and c not in "\n\t" for c in run.stderr):
+            wrong.append("only printable characters")
         if any("trajectory.h5" in files for _, _, files in os.walk(tmp)):
             wrong.append("a trajectory was begun")
         if verbose:

@@ -19,7 +19,7 @@ def defaults():
     for mode, left_out in (("dynamic", ("load_steps",)), ("static", ("dt", "t_end"))):
         with tempfile.TemporaryDirectory() as folder:
             with open(f"{folder}/s.yaml", "w") as f:
-                f.write("rods: [{line: {from: [0, 0, 0], to: [0, -1, 0], edges: 4}}]\nsupports: [{vertex: 0, type: clamp}]\n")
+                f.write("rods: [{line: {from: [0, 0, 0], to: [0, -1, 0], edges: 4}, material: default}]\nsupports: [{vertex: 0, type: clamp}]\n")
                 f.write(f"simulation: {{mode: {mode}}}\n")
             subprocess.run([program, "-scene", "s.yaml"], cwd=folder, check=True, capture_output=True)
             with open(f"{folder}/out/options.yaml") as f:
@@ -76,6 +76,7 @@ def exampleScene(path, value):
         scene["supports"][0]["type"] = "clamp"
     if not any(shape in scene.get("rods", [{}])[0] for shape in ("line", "ring", "helix", "points", "file")):
         put(scene, "rods[].line", {"from": [0, 0, 0], "to": [1, 0, 0], "edges": 6})
+    put(scene, "rods[].material", "default")
     put(scene, "supports[].rod", "all")
     put(scene, "supports[].vertex", 0)
     put(scene, "supports[].type", "clamp")

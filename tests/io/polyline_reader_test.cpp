@@ -24,7 +24,8 @@ TEST(PolylineReader, ReadsPointsWithCommentsAndSeveralRods) {
 
 TEST(PolylineReader, ReadsLinesOfObj) {
   const Folder folder;
-  const auto lines = readPolylines(folder.write("a.obj", "o ring and rods\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nl 1 2 3 1\nl -2/1 -1/2\nv 5 0 0\nl 1 4\n"));
+  const auto lines = readPolylines(
+      folder.write("a.obj", "o ring and rods\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nl 1 2 3 1\nv 1 0 0\nv 0 1 0\nl -2/1 -1/2\nv 0 0 0\nv 5 0 0\nl 6 7\n"));
   ASSERT_EQ(lines.size(), 3u);
   EXPECT_TRUE(lines[0].closed);
   ASSERT_EQ(lines[0].points.size(), 3u); // the first is not repeated
@@ -32,6 +33,43 @@ TEST(PolylineReader, ReadsLinesOfObj) {
   EXPECT_FALSE(lines[1].closed);
   EXPECT_EQ(lines[1].points, (std::vector<Vec3>{{1, 0, 0}, {0, 1, 0}})); // counted from the end, with texture coordinates
   EXPECT_EQ(lines[2].points, (std::vector<Vec3>{{0, 0, 0}, {5, 0, 0}}));
+}
+
+/// x of the vertices of every polyline of an .obj file whose vertex k is at x = k.
+std::vector<std::vector<int>> chainsOf(const std::string &elements, std::vector<bool> *closed = nullptr) {
+  const Folder folder;
+  std::string text;
+  for (int k = 1; k <= 9; ++k) text += "v " + std::to_string(k) + " 0 0\n";
+  std::vector<std::vector<int>> chains;
+  for (const Polyline &line : readPolylines(folder.write("a.obj", text + elements))) {
+    std::vector<int> &chain = chains.emplace_back();
+    for (const Vec3 &x : line.points) chain.push_back(int(x[0]));
+    if (closed) closed->push_back(line.closed);
+  }
+  return chains;
+}
+
+TEST(PolylineReader, JoinsLinesOfObjThatShareVertices) {
+  using Chains = std::vector<std::vector<int>>;
+  EXPECT_EQ(chainsOf("l 1 2\nl 2 3\nl 3 4\n"), (Chains{{1, 2, 3, 4}}));
+  EXPECT_EQ(chainsOf("l 3 4\nl 7 8\nl 2 1\nl 3 2\nl 8 9\n"), (Chains{{1, 2, 3, 4}, {7, 8, 9}})); // in any order, the way of the first edge
+  EXPECT_EQ(chainsOf("l 4 3\nl 2 3 \nl 1 2\n"), (Chains{{4, 3, 2, 1}}));
+  EXPECT_EQ(chainsOf("l 1 2 3\nl 5 4 3\n"), (Chains{{1, 2, 3, 4, 5}}));
+  std::vector<bool> closed;
+  EXPECT_EQ(chainsOf("l 5 6\nl 2 3\nl 1 2\nl 3 1\n", &closed), (Chains{{5, 6}, {2, 3, 1}}));
+  EXPECT_EQ(closed, (std::vector<bool>{false, true}));
+  EXPECT_TRUE(says(messageOf([] { chainsOf("l 1 2\nl 2 3\nl 2 4\n"); }), "a.obj:12: vertex 2 has a third edge here"));
+  EXPECT_TRUE(says(messageOf([] { chainsOf("l 1 2 3 4 2\n"); }), "a.obj:10: vertex 2 has a third edge here"));
+  EXPECT_TRUE(says(messageOf([] { chainsOf("l 1 1\n"); }), "a.obj:10: an edge from vertex 1 to itself"));
+}
+
+TEST(PolylineReader, ByteOrderMarksAreNoText) {
+  const Folder folder;
+  EXPECT_EQ(readPolylines(folder.write("a.csv", "\xEF\xBB\xBF"
+                                                "0,0,0\n1,0,0\n"))[0]
+                .points,
+            (std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}}));
+  EXPECT_EQ(readPolylines(folder.write("a.obj", "\xEF\xBB\xBFv 5 5 5\nv 0 0 0\nv 1 0 0\nl 2 3\n"))[0].points, (std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}}));
 }
 
 /// An HDF5 file of five points, with what else is asked for.

@@ -94,7 +94,7 @@ inline constexpr Key keys[] = {
     {"rods[].helix.edges", KeyType::integer, "", "required", "number of edges", {2}, "", "128"},
     {"rods[].points", KeyType::vectors, "m", "(another shape)", "its vertices", anything, "", "[[0, 0, 0], [1, 0, 0], [1, 1, 0]]"},
     {"rods[].file", KeyType::file, "m", "(another shape)",
-     "polylines: .csv/.txt (a point a line, # begins a comment, an empty line ends a rod), .obj (an l element a rod, closed when it ends where it began), .h5 "
+     "polylines: .csv/.txt (a point a line, # begins a comment, an empty line ends a rod), .obj (l elements; those that share a vertex are one rod, closed when it ends where it began), .h5 "
      "(position (n, 3), rod_vertex_offsets (rods + 1), closed (rods)); the path is relative to the scene"},
     {"rods[].place", KeyType::map, "", "(as drawn)", "where the shape is put: scaled about the origin, turned about it, then moved"},
     {"rods[].place.scale", KeyType::number, "", "1", "factor of all coordinates", positive, "", "0.001"},
@@ -117,7 +117,9 @@ inline constexpr Key keys[] = {
     {"rods[].copies", KeyType::map, "", "(one)", "the same rod several times"},
     {"rods[].copies.count", KeyType::integer, "", "required", "number of rods", from_one, "", "3"},
     {"rods[].copies.offset", KeyType::vector, "m", "required", "from one to the next", anything, "", "[0, 0, 0.1]"},
-    {"rods[].material", KeyType::map, "", "(a thin soft rod)", "a homogeneous section and/or stiffnesses, which replace what follows from it; each key is an option -rod_<key>, too"},
+    {"rods[].material", KeyType::word_or_map, "", "required",
+     "a homogeneous section and/or stiffnesses, which replace what follows from it; each key is an option -rod_<key>, too, beside which the block may be left out. default: a thin soft rod",
+     anything, "default", "default"},
     {"rods[].material.radius", KeyType::number, "m", "(another section)", "of a circular section", positive, "", "0.01"},
     {"rods[].material.radii", KeyType::pair, "m", "(another section)", "semi-axes of an elliptic section, along the first and the second director", positive, "", "[2e-3, 1e-3]"},
     {"rods[].material.width", KeyType::number, "m", "(another section)", "of a rectangular section, along the first director", positive, "", "0.02"},
@@ -196,6 +198,8 @@ inline constexpr Key keys[] = {
      "what makes a step good: an energy that falls (energy), and flattens, too (wolfe), or a residual that falls (residual), for comparison", anything,
      "energy|wolfe|residual", "wolfe", "solver"},
     {"-quasi_newton", KeyType::integer, "", "1", "iterations that share a factorisation, corrected by secants between; for comparison", from_one, "", "4", "solver"},
+    {"-rod_edges", KeyType::text, "", "(of the scene)", "number of edges: n for all rods, or name:n with commas; the shapes are drawn again, places named by vertices stay",
+     anything, "", "40", "rods"},
     {"-error_estimate", KeyType::flag, "", "false",
      "statics: solve again with half the edge length and tell the estimated error; dynamics: tell that in time, where the integrator leaves it", anything, "", "true", "accuracy"},
     {"-accuracy", KeyType::number, "", "(edges of the scene)", "largest relative error: chooses the edges of every rod, and in dynamics the steps", fraction, "", "", "accuracy"},

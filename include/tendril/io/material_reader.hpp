@@ -14,7 +14,13 @@ using Overrides = std::map<std::string, std::string>;
 /// Keys that an option -rod_<key> may override.
 std::vector<const Key *> rodOverrides();
 
+struct MaterialRead {
+  Material material;
+  std::string defaults; ///< a line that tells the parameters that nobody gave, with their values; empty where there are none
+};
+
+/// \param rod its block, which must have a material, or the word `default`, unless options give one
 /// \throws SceneError
-Material readMaterial(YamlMap &map, const Overrides &overrides);
+MaterialRead readMaterial(YamlMap &rod, const Overrides &overrides);
 
 } // namespace tendril

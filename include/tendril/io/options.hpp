@@ -24,6 +24,7 @@ struct Options {
   LoopSettings loop;
   int load_steps = 1;
   std::optional<Vec3> gravity;
+  std::vector<std::pair<std::string, int>> rod_edges; ///< by names of rods, in order of the command line
   std::string output_dir = "out";
   double output_interval = 0;
   int checkpoint_interval = 0; ///< steps; 0: only at the end
@@ -39,6 +40,9 @@ PetscErrorCode readOptions(int argc, char **argv, Options *options);
 
 /// Fills `loop` and what the command line leaves open from the scene. \throws SceneError
 void resolve(const RunSettings &scene, Options &options);
+
+/// The edges of every rod, those of -rod_edges in place of the scene's. \throws SceneError
+std::vector<int> edgesAsked(const Scene &scene, const Options &options);
 
 /// Refuses options that nobody has asked for; call when the solvers are set up. \throws SceneError
 PetscErrorCode refuseUnknownOptions();

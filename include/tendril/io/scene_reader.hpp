@@ -26,7 +26,11 @@ struct SceneFile {
   SceneSource source;
   std::vector<Drawing> drawings; ///< per rod
   RunSettings run;
+  std::vector<std::string> notes; ///< to be told at the start: defaults of materials, and warnings
 };
+
+/// Rods that a word means: a name, which is also that of all rods of its block, a number from 0, or `all`. Empty where it means none.
+std::vector<int> rodsOf(const std::vector<Rod> &rods, const std::string &word);
 
 /// \throws SceneError
 SceneFile readScene(const std::string &path, const Overrides &overrides = {});

@@ -10,11 +10,17 @@
 
 namespace tendril {
 
+/// The documents of a YAML text. Refused are more than a few million values (those of aliases counted where they stand), maps and lists in more than 32
+/// others, and what no document can begin with, at which yaml-cpp would stay for ever. \throws SceneError with the line
+std::vector<YAML::Node> loadYaml(const std::string &text, const std::string &file);
+
 /// One value of a YAML file.
 class YamlValue {
 public:
   YamlValue(const YAML::Node &node, std::string file, std::string name) : node_(node), file_(std::move(file)), name_(std::move(name)) {}
 
+  /// File and line, or the option.
+  std::string place() const;
   [[noreturn]] void fail(const std::string &message) const;
   const std::string &name() const { return name_; }
   const std::string &file() const { return file_; }

@@ -1,0 +1,24 @@
+#pragma once
+/// \file text.hpp
+/// Text from files, and text for terminals.
+
+#include <istream>
+#include <string>
+
+namespace tendril {
+
+/// A file of text in UTF-8, without its byte order mark.
+/// \param missing what to say behind the path where it cannot be opened
+/// \throws SceneError: cannot be opened, is larger than 64 MB, or with the line of the first byte that is no text
+std::string readText(const std::string &path, const std::string &missing);
+
+/// Puts a file that begins with a byte order mark of UTF-8 behind it.
+void skipByteOrderMark(std::istream &file);
+
+/// What may go to a terminal: control characters but newline and tab, and bytes that are no UTF-8, as \xNN.
+std::string printable(const std::string &text);
+
+/// In quotes, with at most 60 bytes.
+std::string excerpt(const std::string &text);
+
+} // namespace tendril

@@ -1,0 +1,79 @@
+#include "tendril/io/text.hpp"
+
+#include "tendril/model/scene.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string_view>
+
+namespace tendril {
+namespace {
+
+/// Bytes of the character at a place, or 0 where there is none that may be shown. UTF-8 as in RFC 3629, section 4.
+int characterLength(const std::string &text, std::size_t at) {
+  auto byte = [&](std::size_t k) { return k < text.size() ? static_cast<unsigned char>(text[k]) : 0u; };
+  const unsigned first = byte(at), second = byte(at + 1);
+  if (first < 0x80) return (first >= 0x20 && first != 0x7F) || first == '\n' || first == '\t';
+  const int length = first < 0xC2 ? 0 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : first < 0xF5 ? 4 : 0;
+  for (int k = 1; k < length; ++k)
+    if ((byte(at + std::size_t(k)) & 0xC0) != 0x80) return 0;
+  const bool control = first == 0xC2 && second < 0xA0, longer = (first == 0xE0 && second < 0xA0) || (first == 0xF0 && second < 0x90),
+             surrogate = first == 0xED && second > 0x9F, beyond = first == 0xF4 && second > 0x8F;
+  return control || longer || surrogate || beyond ? 0 : length;
+}
+
+std::string inHex(char c) {
+  constexpr const char *digits = "0123456789ABCDEF";
+  const auto byte = static_cast<unsigned char>(c);
+  return {digits[byte >> 4], digits[byte & 15]};
+}
+
+} // namespace
+
+void skipByteOrderMark(std::istream &file) {
+  char first[3] = {};
+  if (file.read(first, 3) && std::string_view(first, 3) == "\xEF\xBB\xBF") return;
+  file.clear();
+  file.seekg(0);
+}
+
+std::string readText(const std::string &path, const std::string &missing) {
+  constexpr std::uintmax_t most = 64'000'000;
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw SceneError(path + missing);
+  std::error_code none;
+  if (const auto size = std::filesystem::file_size(path, none); !none && size > most)
+    throw SceneError(path + ": has " + std::to_string(size) + " bytes, at most " + std::to_string(most) + " are read; write points into polyline files");
+  skipByteOrderMark(file);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  for (std::size_t k = 0; k < text.size();) {
+    const int length = text[k] == '\r' ? 1 : characterLength(text, k);
+    if (length == 0)
+      throw SceneError(path + ":" + std::to_string(1 + std::count(text.begin(), text.begin() + std::ptrdiff_t(k), '\n')) + ": the byte 0x" + inHex(text[k]) +
+                       " is no text; save the file as UTF-8");
+    k += std::size_t(length);
+  }
+  return text;
+}
+
+std::string printable(const std::string &text) {
+  std::string out;
+  for (std::size_t k = 0; k < text.size();) {
+    const int length = characterLength(text, k);
+    if (length == 0)
+      out += "\\x" + inHex(text[k]);
+    else
+      out.append(text, k, std::size_t(length));
+    k += std::size_t(std::max(length, 1));
+  }
+  return out;
+}
+
+std::string excerpt(const std::string &text) {
+  constexpr std::size_t most = 60;
+  return "'" + (text.size() > most ? text.substr(0, most) + "..." : text) + "'";
+}
+
+} // namespace tendril
