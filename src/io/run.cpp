@@ -358,9 +358,9 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, int *exi
   }
   if (widest.rod >= 0) {
     std::ostringstream line;
-    line << "warning: neighbouring edges of rod '" << run.scene.rods[std::size_t(widest.rod)].name << "' came to turn or twist by up to " << std::setprecision(3)
-         << widest.angle * 180 / pi << " degrees, at vertex " << widest.vertex << " and " << (o.loop.dynamic ? "time " : "load factor ") << widest.time
-         << "; measure tan is stiffer than the rod above 30: use more edges, or -rod_measure angle";
+    line << "warning: neighbouring edges of rod '" << run.scene.rods[std::size_t(widest.rod)].name << "' came to turn or twist by up to "
+         << std::setprecision(3) << widest.angle * 180 / pi << " degrees, at vertex " << widest.vertex << " and " << (o.loop.dynamic ? "time " : "load factor ")
+         << widest.time << "; measure tan is stiffer than the rod above 30: use more edges, or -rod_measure angle";
     progress.say(line.str());
   }
   if (last.rounding_error > 0) {
@@ -412,7 +412,13 @@ int runMain(int count, char **arguments) {
     std::fprintf(stderr, "tendril: %s\n", printable(e.what()).c_str());
     return 1;
   }
-  if (PetscInitialize(&argc, &argv, nullptr, nullptr)) return 1;
+  {
+    const QuietErrors errors;
+    if (PetscInitialize(&argc, &argv, nullptr, nullptr)) {
+      std::fprintf(stderr, "tendril: %s\n", printable(files.locate("command line: " + errors.message())).c_str());
+      return 1;
+    }
+  }
   int exit_code = 0;
   try {
     const PetscErrorCode error = [&]() -> PetscErrorCode {
