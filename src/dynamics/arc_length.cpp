@@ -445,6 +445,7 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     PetscCall(PetscTime(&now));
     row.wall_seconds = now - begin;
     PetscCall(observe(state, row));
+    if (stops && state.time < settings_.t_end && stops()) PetscFunctionReturn(0);
     length = std::clamp(length * std::clamp(std::sqrt(wanted_iterations / std::max(iterations_, 1)), 0.5, 2.0), shortest, most_growth * first);
   }
   *finished = true;

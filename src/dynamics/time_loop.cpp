@@ -209,7 +209,9 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
   int rejected = 0, in_vain = 0; // steps since the last one accepted, and their iterations
   PetscLogDouble begin, now;
   PetscCall(PetscTime(&begin));
-  EnergyBudget before = energyBudget(potential.scene(), potential.elements(), state, settings_.dynamic ? 1 : state.time);
+  // A run that begins has no step behind it, whatever the loop has run before.
+  const bool goes_on = !std::isnan(control.energy) && (settings_.dynamic || state.time > 0);
+  if (!goes_on) control.energy = energyBudget(potential.scene(), potential.elements(), state, settings_.dynamic ? 1 : state.time).total();
   *finished = false;
   const bool plain = !settings_.dynamic || (integrator_->leavesChords() && !adapts && !settings_.estimate_error);
   State next = state; // what the blocks that have converged come to; the state itself stays as it is until all have
@@ -295,8 +297,8 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     row.time = state.time;
     row.dt = h;
     row.energy = energy;
-    row.dissipated = before.total() - row.energy.total();
-    before = row.energy;
+    row.dissipated = control.energy - row.energy.total();
+    control.energy = row.energy.total();
     row.newton_iterations = report.iterations;
     row.line_search_trials = report.trials;
     row.negative_pivots = report.negative_pivots;
@@ -308,6 +310,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     control.rounding_sum = settings_.dynamic ? control.rounding_sum + report.rounding_error : report.rounding_error;
     row.rounding_error = control.rounding_sum;
     PetscCall(observe(state, row));
+    if (stops && state.time < settings_.t_end && stops()) PetscFunctionReturn(0);
   }
   *finished = true;
   PetscFunctionReturn(0);

@@ -1,7 +1,5 @@
 #include "tendril/io/hdf5.hpp"
 
-#include "tendril/model/scene.hpp"
-
 #include <algorithm>
 #include <chrono>
 #include <thread>
@@ -13,10 +11,11 @@ constexpr std::size_t chunk_bytes = 1 << 16;  ///< at least a slab, about as muc
 constexpr std::size_t direct_bytes = 1 << 18; ///< slabs from here on are not worth collecting
 constexpr const char *write_failed = "the trajectory cannot be written; is the disk full?";
 
-template <class Id> Id checked(Id id, const std::string &what) {
-  if (id < 0) throw SceneError(what);
+template <class Error = SceneError, class Id> Id checked(Id id, const std::string &what) {
+  if (id < 0) throw Error(what);
   return id;
 }
+template <class Id> Id written(Id id, const std::string &what) { return checked<WriteError>(id, what); }
 
 /// Whoever reads a file looks into it for a moment, which keeps it from being locked; another run stays.
 template <class Open> hid_t patiently(Open open) {
@@ -35,20 +34,20 @@ void attach(hid_t to, const std::string &name, const std::string &value) {
   H5Tset_cset(type, H5T_CSET_UTF8);
   const Hdf5Space space = H5Screate(H5S_SCALAR);
   const Hdf5Attribute a = H5Acreate2(to, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT);
-  H5Awrite(a, type, value.c_str());
+  written(H5Awrite(a, type, value.c_str()), write_failed);
 }
 
 void attach(hid_t to, const std::string &name, const std::vector<double> &values) {
   const hsize_t size = values.size();
   const Hdf5Space space = H5Screate_simple(1, &size, nullptr);
   const Hdf5Attribute a = H5Acreate2(to, name.c_str(), H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT);
-  H5Awrite(a, H5T_NATIVE_DOUBLE, values.data());
+  written(H5Awrite(a, H5T_NATIVE_DOUBLE, values.data()), write_failed);
 }
 
 template <class Number> void attachScalar(hid_t to, const std::string &name, Number value, hid_t stored, hid_t native) {
   const Hdf5Space space = H5Screate(H5S_SCALAR);
   const Hdf5Attribute a = H5Acreate2(to, name.c_str(), stored, space, H5P_DEFAULT, H5P_DEFAULT);
-  H5Awrite(a, native, &value);
+  written(H5Awrite(a, native, &value), write_failed);
 }
 void attach(hid_t to, const std::string &name, double value) { attachScalar(to, name, value, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE); }
 void attach(hid_t to, const std::string &name, int value) { attachScalar(to, name, value, H5T_STD_I32LE, H5T_NATIVE_INT); }
@@ -82,11 +81,11 @@ Hdf5File Hdf5File::reopen(const std::string &path) {
   return f;
 }
 
-void Hdf5File::startAppending() { checked(H5Fstart_swmr_write(file_), path_ + ": cannot be opened for appending"); }
+void Hdf5File::startAppending() { written(H5Fstart_swmr_write(file_), path_ + ": cannot be opened for appending"); }
 
 bool Hdf5File::has(const std::string &name) const { return H5Lexists(file_, name.c_str(), H5P_DEFAULT) > 0; }
 
-std::vector<double> Hdf5File::read(const std::string &name, hsize_t columns) const {
+std::vector<double> Hdf5File::read(const std::string &name, hsize_t columns, std::optional<hsize_t> rows) const {
   if (!has(name)) throw SceneError(path_ + ": has no dataset '" + name + "'");
   const Hdf5Dataset data = checked(H5Dopen2(file_, name.c_str(), H5P_DEFAULT), path_ + ": '" + name + "' is not a dataset");
   const Hdf5Space space = H5Dget_space(data);
@@ -95,6 +94,8 @@ std::vector<double> Hdf5File::read(const std::string &name, hsize_t columns) con
   if (rank > 0) H5Sget_simple_extent_dims(space, shape.data(), nullptr);
   const bool fits = columns == 1 ? rank == 1 : rank == 2 && shape.back() == columns;
   if (!fits) throw SceneError(path_ + ": dataset '" + name + "' must have " + (columns == 1 ? "one dimension" : "shape (n, " + std::to_string(columns) + ")"));
+  if (rows && shape[0] != *rows)
+    throw SceneError(path_ + ": '" + name + "' has " + std::to_string(shape[0]) + " entries, where it takes " + std::to_string(*rows));
   // Rows that were declared but never written would be zeros. Compressed, a byte stands for a thousand at most.
   constexpr hsize_t most_rows = 50'000'000, most_compressed = 1100;
   if (shape[0] > most_rows)
@@ -110,22 +111,70 @@ std::vector<double> Hdf5File::read(const std::string &name, hsize_t columns) con
   return values;
 }
 
+std::string Hdf5File::readText(const std::string &name, std::size_t most) const {
+  if (!has(name)) throw SceneError(path_ + ": has no dataset '" + name + "'");
+  const Hdf5Dataset data = checked(H5Dopen2(file_, name.c_str(), H5P_DEFAULT), path_ + ": '" + name + "' is not a dataset");
+  const Hdf5Type type = H5Dget_type(data);
+  const Hdf5Space space = H5Dget_space(data);
+  const std::string no_text = path_ + ": '" + name + "' is not a text";
+  if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) > 0 || H5Sget_simple_extent_npoints(space) != 1 || H5Tget_size(type) > most)
+    throw SceneError(no_text);
+  std::string value(H5Tget_size(type), '\0');
+  checked(H5Dread(data, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, value.data()), no_text);
+  value.resize(std::min(value.find('\0'), value.size()));
+  return value;
+}
+
+std::optional<double> Hdf5File::number(const std::string &attribute) const {
+  if (H5Aexists(file_, attribute.c_str()) <= 0) return {};
+  const Hdf5Attribute a = H5Aopen(file_, attribute.c_str(), H5P_DEFAULT);
+  const Hdf5Space space = H5Aget_space(a);
+  double value;
+  if (H5Sget_simple_extent_npoints(space) != 1 || H5Aread(a, H5T_NATIVE_DOUBLE, &value) < 0) return {};
+  return value;
+}
+
+std::optional<std::string> Hdf5File::text(const std::string &attribute) const {
+  if (H5Aexists(file_, attribute.c_str()) <= 0) return {};
+  const Hdf5Attribute a = H5Aopen(file_, attribute.c_str(), H5P_DEFAULT);
+  const Hdf5Type type = H5Aget_type(a);
+  const Hdf5Space space = H5Aget_space(a);
+  if (H5Tget_class(type) != H5T_STRING || H5Sget_simple_extent_npoints(space) != 1) return {};
+  if (H5Tis_variable_str(type) > 0) { // as h5py writes them
+    char *value = nullptr;
+    if (H5Aread(a, type, &value) < 0 || !value) return {};
+    const std::string text = value;
+    H5free_memory(value);
+    return text;
+  }
+  std::string value(H5Tget_size(type), '\0');
+  if (H5Aread(a, type, value.data()) < 0) return {};
+  value.resize(std::min(value.find('\0'), value.size()));
+  return value;
+}
+
+void Hdf5File::close() {
+  const herr_t flushed = H5Fflush(file_, H5F_SCOPE_LOCAL);
+  file_ = {};
+  written(flushed, path_ + ": cannot be written; is the disk full?");
+}
+
 void Hdf5File::createGroup(const std::string &name) {
-  Hdf5Group(checked(H5Gcreate2(file_, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written"));
+  Hdf5Group(written(H5Gcreate2(file_, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written; is the disk full?"));
 }
 
 void Hdf5File::write(const std::string &name, const std::vector<hsize_t> &shape, const double *values, const std::string &unit) {
   const Hdf5Space space = H5Screate_simple(int(shape.size()), shape.data(), nullptr);
   const Hdf5Dataset data =
-      checked(H5Dcreate2(file_, name.c_str(), H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written");
-  checked(H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), path_ + ": cannot be written");
+      written(H5Dcreate2(file_, name.c_str(), H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written; is the disk full?");
+  written(H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), path_ + ": cannot be written; is the disk full?");
   if (!unit.empty()) attach(data, "unit", unit);
 }
 
 void Hdf5File::write(const std::string &name, const std::vector<hsize_t> &shape, const int *values) {
   const Hdf5Space space = H5Screate_simple(int(shape.size()), shape.data(), nullptr);
-  const Hdf5Dataset data = checked(H5Dcreate2(file_, name.c_str(), H5T_STD_I32LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written");
-  checked(H5Dwrite(data, H5T_NATIVE_INT, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), path_ + ": cannot be written");
+  const Hdf5Dataset data = written(H5Dcreate2(file_, name.c_str(), H5T_STD_I32LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written; is the disk full?");
+  written(H5Dwrite(data, H5T_NATIVE_INT, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), path_ + ": cannot be written; is the disk full?");
 }
 
 void Hdf5File::write(const std::string &name, const std::vector<std::string> &values) {
@@ -146,13 +195,14 @@ void Hdf5File::writeStrings(const std::string &name, hid_t space, std::size_t wi
   H5Tset_size(type, width);
   H5Tset_cset(type, H5T_CSET_UTF8);
   H5Tset_strpad(type, H5T_STR_NULLPAD);
-  const Hdf5Dataset data = checked(H5Dcreate2(file_, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written");
-  checked(H5Dwrite(data, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), path_ + ": cannot be written");
+  const Hdf5Dataset data = written(H5Dcreate2(file_, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written; is the disk full?");
+  written(H5Dwrite(data, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), path_ + ": cannot be written; is the disk full?");
 }
 
 void Hdf5File::writeAttribute(const std::string &name, const std::string &value) { attach(file_, name, value); }
 void Hdf5File::writeAttribute(const std::string &name, const std::vector<double> &values) { attach(file_, name, values); }
 void Hdf5File::writeAttribute(const std::string &name, int value) { attach(file_, name, value); }
+void Hdf5File::writeAttribute(const std::string &name, double value) { attach(file_, name, value); }
 
 void Hdf5File::writeAttribute(const std::string &object, const std::string &name, const std::string &value) { attach(objectAt(object), name, value); }
 void Hdf5File::writeAttribute(const std::string &object, const std::string &name, double value) { attach(objectAt(object), name, value); }
@@ -175,7 +225,7 @@ Hdf5Series::Hdf5Series(const Hdf5File &file, const std::string &name, const std:
   const Hdf5Properties access = H5Pcreate(H5P_DATASET_ACCESS);
   if (isLarge()) H5Pset_chunk_cache(access, 0, 0, 1); // no cache: to the file from where the values are
   const hid_t type = integer ? H5T_STD_I64LE : H5T_IEEE_F64LE;
-  dataset_ = checked(H5Dcreate2(file.id(), name.c_str(), type, space, H5P_DEFAULT, create, access), "dataset " + name + " cannot be created");
+  dataset_ = written(H5Dcreate2(file.id(), name.c_str(), type, space, H5P_DEFAULT, create, access), "dataset " + name + " cannot be created");
 }
 
 bool Hdf5Series::isLarge() const { return slab_size_ * sizeof(double) >= direct_bytes; }
@@ -190,7 +240,7 @@ void Hdf5Series::append(const double *values) {
 void Hdf5Series::flush() {
   if (!waiting_.empty()) write(waiting_.data(), waiting_.size() / slab_size_);
   waiting_.clear();
-  checked(H5Dflush(dataset_), write_failed);
+  written(H5Dflush(dataset_), write_failed);
 }
 
 void Hdf5Series::write(const double *values, hsize_t slabs) {
@@ -198,10 +248,10 @@ void Hdf5Series::write(const double *values, hsize_t slabs) {
   start[0] = extent_[0];
   count[0] = slabs;
   extent_[0] += slabs;
-  checked(H5Dset_extent(dataset_, extent_.data()), write_failed);
+  written(H5Dset_extent(dataset_, extent_.data()), write_failed);
   const Hdf5Space file_space = H5Dget_space(dataset_), memory = H5Screate_simple(int(count.size()), count.data(), nullptr);
   H5Sselect_hyperslab(file_space, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
-  checked(H5Dwrite(dataset_, H5T_NATIVE_DOUBLE, memory, file_space, H5P_DEFAULT, values), write_failed);
+  written(H5Dwrite(dataset_, H5T_NATIVE_DOUBLE, memory, file_space, H5P_DEFAULT, values), write_failed);
 }
 
 } // namespace tendril

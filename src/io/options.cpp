@@ -192,6 +192,8 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   o->output_interval = o->loop.output_interval = texts.number("-output_interval");
   o->checkpoint_interval = texts.integer("-checkpoint_interval");
   o->restart = texts.text("-restart");
+  if (texts.has("-restart_time")) o->restart_time = texts.number("-restart_time");
+  if (texts.has("-time_limit")) o->time_limit = texts.number("-time_limit");
   o->fields = readFields(texts);
   o->error_estimate = o->loop.estimate_error = texts.flag("-error_estimate");
   const std::string of = texts.word("-accuracy_of");
@@ -251,6 +253,8 @@ void resolve(const RunSettings &scene, Options &o) {
     const bool arclength = o.loop.continuation == Continuation::arclength;
     if (o.arclength_steps && !arclength) fail("arclength_steps", "needs -continuation arclength");
   }
+  if (o.restart_time && o.restart.empty()) fail("restart_time", "needs -restart");
+  if (o.restart_time && !o.loop.dynamic) fail("restart_time", "has no meaning in -mode static, where time is the load factor");
   checkAccuracy(o);
   if (o.loop.dt_min > o.loop.dt) fail("dt_min", "must not be larger than the step " + std::to_string(o.loop.dt));
 }
@@ -364,7 +368,9 @@ std::string writeOptionsFile(const std::string &path, const Options &o, const Pr
   put("petsc_options", p.options);
   out << YAML::EndMap;
   const std::string text = std::string(out.c_str()) + "\n";
-  std::ofstream(path) << text;
+  std::ofstream file(path);
+  file << text << std::flush;
+  if (!file) throw WriteError(path + ": cannot be written; is the disk full?");
   return text;
 }
 

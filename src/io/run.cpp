@@ -7,32 +7,21 @@
 #include "tendril/io/keys.hpp"
 #include "tendril/io/option_files.hpp"
 #include "tendril/io/options.hpp"
+#include "tendril/io/output_folder.hpp"
 #include "tendril/io/progress.hpp"
 #include "tendril/io/text.hpp"
+#include "tendril/io/stop.hpp"
 #include "tendril/solver/events.hpp"
 
 #include <algorithm>
 #include <ctime>
 #include <filesystem>
-#include <fstream>
 #include <iomanip>
 #include <memory>
 #include <sstream>
 
 namespace tendril {
 namespace {
-
-/// Whether there was none.
-bool makeFolder(const std::string &folder) {
-  std::error_code error;
-  const bool made = std::filesystem::create_directories(folder, error);
-  const std::string probe = folder + "/.probe";
-  std::ofstream file(probe);
-  if (error || !file) throw SceneError("option -output_dir: '" + folder + "' cannot be written; choose another folder");
-  file.close();
-  std::filesystem::remove(probe, error);
-  return made;
-}
 
 std::string groupsText(const Scene &scene) {
   std::ostringstream s;
@@ -201,7 +190,74 @@ void tellTimeError(const Diagnostics &last, const Options &o, Progress &progress
   writeTimeError(o.output_dir + "/trajectory.h5", with_rounding);
 }
 
-PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, int *exit_code) {
+std::string textOf(const SceneSource &source) {
+  std::string text = source.text;
+  for (const auto &[path, content] : source.files) text += '\0' + path + '\0' + content;
+  return text;
+}
+
+bool isInside(const std::string &file, const std::string &folder) {
+  std::error_code none;
+  const std::filesystem::path whole = std::filesystem::weakly_canonical(file, none), top = std::filesystem::weakly_canonical(folder, none);
+  return std::mismatch(top.begin(), top.end(), whole.begin(), whole.end()).first == top.end();
+}
+
+/// Takes up the checkpoint that -restart asks for and makes room for the results. False where the run was complete already.
+bool takeUp(const Options &o, const OutputFolder &folder, const RunFacts &facts, Simulation &run, StepControl *control, std::vector<std::string> *told) {
+  const bool automatic = o.restart == "auto";
+  std::string from;
+  bool changed = false;
+  if (!o.restart.empty() && !o.loop.dynamic && o.loop.continuation == Continuation::arclength)
+    throw SceneError("option -restart: -continuation arclength cannot be taken up again");
+  if (automatic && o.restart_time) throw SceneError("option -restart_time: -restart auto goes on at the time of its checkpoint");
+  if (automatic) {
+    for (const std::string &path : folder.checkpoints()) {
+      try {
+        changed = readCheckpoint(path, &run, control, facts, told);
+        from = path;
+        break;
+      } catch (const DamagedCheckpoint &e) {
+        told->push_back("passed over: " + std::string(e.what()));
+      }
+    }
+    if (from.empty()) told->push_back("-restart auto: no checkpoint in " + o.output_dir + ", from the start");
+  } else if (!o.restart.empty()) {
+    from = o.restart;
+    changed = readCheckpoint(from, &run, control, facts, told);
+    if (isInside(from, o.output_dir))
+      throw SceneError("option -restart: the results would replace those beside the checkpoint '" + from +
+                       "'; choose another -output_dir, or write -restart auto");
+    if (o.restart_time) run.state.time = *o.restart_time;
+  }
+  if (!from.empty() && !(run.state.time < o.loop.t_end)) {
+    if (changed && !o.loop.dynamic) {
+      run.state.time = 0;
+      *control = {};
+      told->push_back("the load factor begins anew at 0");
+    } else if (automatic && !changed) {
+      std::printf("complete already: %s is at the end, nothing is left to do\n", from.c_str());
+      return false;
+    } else {
+      std::ostringstream time;
+      time << run.state.time;
+      throw SceneError("option -restart: the checkpoint is at " + std::string(o.loop.dynamic ? "time " : "load factor ") + time.str() +
+                       ", nothing is left to do" + (o.loop.dynamic ? "; write a larger -t_end, or another -restart_time" : ""));
+    }
+  }
+  if (from.empty() || !automatic) {
+    std::string names;
+    for (const std::string &name : folder.clear()) names += (names.empty() ? "" : ", ") + name;
+    if (!names.empty()) told->push_back("removed from " + o.output_dir + ", of an earlier run: " + names);
+  } else
+    from = folder.setAside(from);
+  if (from.empty()) return true;
+  std::ostringstream line;
+  line << "goes on from " << from << " at " << (o.loop.dynamic ? "time " : "load factor ") << run.state.time;
+  told->insert(told->begin(), line.str());
+  return true;
+}
+
+PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequest::Clock::time_point begin, int *exit_code) {
   PetscFunctionBeginUser;
   Options o;
   {
@@ -225,32 +281,26 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, int *exi
   }
   if (o.help) PetscFunctionReturn(0);
   PetscCall(refuseUnknownOptions());
-  const bool made_folder = makeFolder(o.output_dir);
+  const OutputFolder folder(o.output_dir);
   Choice choice;
-  try {
-    if (o.accuracy) PetscCall(meetAccuracy(prepared, o, &choice));
-  } catch (const SceneError &) { // nothing was written yet
-    std::error_code error;
-    if (made_folder) std::filesystem::remove(o.output_dir, error);
-    throw;
-  }
+  if (o.accuracy) PetscCall(meetAccuracy(prepared, o, &choice));
   Simulation &run = *prepared.run;
   TimeLoop loop(run.solver, o.loop);
-  if (!o.restart.empty()) {
-    if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength)
-      throw SceneError("option -restart: -continuation arclength cannot be taken up again");
-    readCheckpoint(o.restart, &run.state, &loop.control, o.loop.integrator.name);
-    std::error_code none;
-    if (std::filesystem::equivalent(std::filesystem::absolute(o.restart).parent_path(), o.output_dir, none))
-      throw SceneError("option -restart: the results would replace those beside the checkpoint '" + o.restart + "'; choose another -output_dir");
-    if (!(run.state.time < o.loop.t_end))
-      throw SceneError("option -restart: the checkpoint is at time " + std::to_string(run.state.time) + ", nothing is left to do; write a larger -t_end");
+  RunFacts facts(run.scene, o.loop, textOf(prepared.source));
+  for (const char *name : {"snes_rtol", "snes_max_it"}) {
+    char value[64];
+    PetscBool given;
+    PetscCall(PetscOptionsGetString(nullptr, nullptr, (std::string("-") + name).c_str(), value, sizeof value, &given));
+    facts.facts.push_back({RunFacts::Kind::option, name, given ? value : findKey(std::string("-") + name)->fallback});
   }
+  std::vector<std::string> told;
+  if (!takeUp(o, folder, facts, run, &loop.control, &told)) PetscFunctionReturn(0);
   Provenance origin = provenance(argc, argv);
   origin.scene = std::move(prepared.source);
   origin.effective_options = writeOptionsFile(o.output_dir + "/options.yaml", o, origin, run.scene);
   Progress progress(o.loop.t_end, o.output_dir + "/log.txt");
   progress.say(origin.command_line);
+  for (const std::string &line : told) progress.say(line);
   std::istringstream groups(groupsText(run.scene));
   for (std::string line; std::getline(groups, line);) progress.say(line);
   for (const std::string &note : prepared.notes) progress.say(note);
@@ -295,7 +345,7 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, int *exi
     trajectory.flushWhenDue();
     if (o.checkpoint_interval > 0 && state.step % o.checkpoint_interval == 0) {
       trajectory.flush(); // a restart goes on where the frames end
-      writeCheckpoint(checkpoint, state, loop.control, o.loop.integrator.name);
+      writeCheckpoint(checkpoint, run, loop.control, facts);
     }
     progress.step(row);
     dissipated += row.dissipated;
@@ -325,19 +375,25 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, int *exi
   };
   bool finished;
   std::string failure;
+  const StopRequest request(begin, o.time_limit);
+  auto stops = [&] { return request.asked(); };
   if (arclength) {
     ArcLength path(run.solver, o.loop);
     path.on_critical = critical;
+    path.stops = stops;
     PetscCall(path.run(run.state, observe, &finished));
     failure = path.failure();
   } else {
     loop.on_critical = critical;
+    loop.stops = stops;
     PetscCall(loop.run(run.state, observe, &finished));
     failure = loop.failure();
   }
+  const bool stopped = !finished && failure.empty();
+  if (stopped && trajectory.lastTime() < run.state.time) trajectory.writeFrame(run.state);
   PetscCall(PetscLogEventBegin(events().output, 0, 0, 0, 0));
-  trajectory.flush();
-  if (!arclength) writeCheckpoint(checkpoint, run.state, loop.control, o.loop.integrator.name);
+  trajectory.finish();
+  if (!arclength) writeCheckpoint(checkpoint, run, loop.control, facts);
   PetscCall(PetscLogEventEnd(events().output, 0, 0, 0, 0));
   PetscCall(PetscLogStagePop());
   std::ostringstream summary;
@@ -368,7 +424,16 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, int *exi
     rounding << "rounding error: " << std::setprecision(2) << last.rounding_error << " of the rod length" << (o.loop.dynamic ? ", summed over the steps" : "");
     progress.say(rounding.str());
   }
-  if (!finished) {
+  if (stopped) {
+    std::ostringstream line;
+    line << "stopped by " << request.reason() << " at " << (o.loop.dynamic ? "time " : "load factor ") << run.state.time << " of " << o.loop.t_end;
+    if (arclength)
+      line << "; a path of equilibria cannot be gone on with";
+    else
+      line << "; go on with: " << origin.command_line << (o.restart == "auto" ? "" : " -restart auto");
+    progress.say(line.str());
+    *exit_code = request.exitCode();
+  } else if (!finished) {
     progress.say("failed: " + failure);
     std::fprintf(stderr, "tendril: %s\n", printable(failure).c_str());
     *exit_code = 2;
@@ -394,6 +459,9 @@ int runMain(int count, char **arguments) {
   int argc = int(words.size());
   words.push_back(nullptr);
   char **argv = words.data();
+  const auto begin = StopRequest::Clock::now();
+  const KeptSignals signals;
+  std::signal(SIGXFSZ, SIG_IGN); // a file that grows beyond its limit cannot be written: that is told
   // Ours before PETSc's, which come only where solvers are set up for a scene.
   auto given = [&](const char *option) { return std::any_of(argv + 1, argv + argc, [&](const char *word) { return std::string_view(word) == option; }); };
   if (given("--version")) {
@@ -419,13 +487,14 @@ int runMain(int count, char **arguments) {
       return 1;
     }
   }
+  signals.restore();
   int exit_code = 0;
   try {
     const PetscErrorCode error = [&]() -> PetscErrorCode {
       PetscFunctionBeginUser;
       PetscCall(registerEvents());
       PetscCall(registerSolvers());
-      PetscCall(execute(argc, argv, files, &exit_code));
+      PetscCall(execute(argc, argv, files, begin, &exit_code));
       PetscFunctionReturn(0);
     }();
     if (error) exit_code = 1;

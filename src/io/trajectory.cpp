@@ -186,12 +186,17 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
 }
 
 TrajectoryWriter::~TrajectoryWriter() {
-  if (broken_) return;
+  if (broken_ || finished_) return;
   try {
-    flush();
-    writeXdmf();
-  } catch (const SceneError &) { // a run that goes on to its end flushes before, and tells
+    finish();
+  } catch (const SceneError &) { // a run that goes on to its end finishes before, and tells
   }
+}
+
+void TrajectoryWriter::finish() {
+  flush();
+  writeXdmf();
+  finished_ = true;
 }
 
 void TrajectoryWriter::writeHeader(const Scene &scene, const Elements &elements, const Provenance &p) {
@@ -340,7 +345,7 @@ void TrajectoryWriter::writeCritical(double load_factor) { critical_->append(&lo
 void TrajectoryWriter::flush() {
   broken_ = true; // until all went well: half of a frame must not be followed by another
   csv_ << csv_rows_ << std::flush;
-  if (!csv_) throw SceneError(folder_ + "/diagnostics.csv: cannot be written; is the disk full?");
+  if (!csv_) throw WriteError(folder_ + "/diagnostics.csv: cannot be written; is the disk full?");
   csv_rows_.clear();
   for (const auto &series : diagnostics_) series->flush();
   critical_->flush();
@@ -446,8 +451,11 @@ void TrajectoryWriter::writeXdmf() const {
   }
   out << " </Domain>\n</Xdmf>\n";
   out.close();
-  std::error_code ignored;
-  std::filesystem::rename(path + ".part", path, ignored);
+  std::error_code error;
+  if (out) std::filesystem::rename(path + ".part", path, error);
+  if (out && !error) return;
+  std::filesystem::remove(path + ".part", error);
+  throw WriteError(path + ": cannot be written; is the disk full?");
 }
 
 } // namespace tendril

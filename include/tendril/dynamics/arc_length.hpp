@@ -17,6 +17,7 @@ public:
   ArcLength(StepSolver &solver, const LoopSettings &settings);
 
   CriticalObserver on_critical; ///< told of critical points, before the step that passes them
+  std::function<bool()> stops;  ///< as that of TimeLoop
   /// Follows the path from `state` until the load factor is 1 or the steps are used up. `finished` is false when a step of the smallest length
   /// failed; `state` is then the last one accepted. Diagnostics' dt is the step along the path.
   PetscErrorCode run(State &state, const TimeLoop::Observer &observe, bool *finished);

@@ -7,6 +7,7 @@
 #include "tendril/io/trajectory.hpp"
 #include "tendril/solver/step_solver.hpp"
 
+#include <cmath>
 #include <functional>
 
 namespace tendril {
@@ -48,6 +49,7 @@ struct StepControl {
   double error = 0;        ///< adapted steps: of the last one, over what is allowed; 0 where unknown
   double error_sum = 0;    ///< of all steps, over rod lengths
   double rounding_sum = 0; ///< of all steps, over rod lengths
+  double energy = NAN;     ///< at the end of the last step, from which the next one dissipates; NAN where there was none [J]
 };
 
 /// Takes steps and tells the observer of each one accepted.
@@ -56,6 +58,7 @@ public:
   using Observer = std::function<PetscErrorCode(const State &, const Diagnostics &)>;
   StepControl control;
   CriticalObserver on_critical; ///< told of each critical point, before the step beyond it
+  std::function<bool()> stops;  ///< asked after each step whether to end there: `finished` is false then, and failure() is empty
   TimeLoop(StepSolver &solver, const LoopSettings &settings) : solver_(solver), settings_(settings), integrator_(makeIntegrator(settings.integrator)) {}
 
   /// Advances `state` to the end. `finished` is false when dt_min was reached; `state` is then the last one accepted, bit for bit.

@@ -1,17 +1,43 @@
 #pragma once
 /// \file checkpoint.hpp
-/// What a run needs to go on to the same bits: the state and how the time loop is stepping.
+/// What a run needs to go on to the same bits: the state, how the time loop is stepping, and of what run they are.
 
-#include "tendril/dynamics/time_loop.hpp"
+#include "tendril/dynamics/simulation.hpp"
+#include "tendril/io/hdf5.hpp"
 
 namespace tendril {
 
-/// Writes beside `path` and renames: the file is always whole. \throws SceneError when it cannot be written
-void writeCheckpoint(const std::string &path, const State &state, const StepControl &control, const std::string &integrator);
+/// A run by what a restart compares: what is other is told, and another topology is refused.
+struct RunFacts {
+  enum class Kind { option, load, scene };
+  struct Fact {
+    Kind kind;
+    std::string name, value; ///< a value that begins with # stands for something long, by its hash
+  };
+  bool dynamic = true;
+  std::string integrator;
+  double dt = 0;                         ///< as asked for [s, or load factor]
+  std::vector<Fact> facts;               ///< options, loads, supports, materials, laws and shapes
+  std::string topology_hash, scene_hash; ///< of vertices, edges and closedness of all rods; of the text of the scene and its files
 
-/// \param state initial state of the scene, replaced; its sizes are what the file must fit
-/// What another integrator remembered is left out.
-/// \throws SceneError when the file is missing, incomplete or of another scene
-void readCheckpoint(const std::string &path, State *state, StepControl *control, const std::string &integrator);
+  /// \param text of the scene and the files it names
+  RunFacts(const Scene &scene, const LoopSettings &settings, const std::string &text = "");
+};
+
+/// A checkpoint of which not all is there, or not as it was written.
+struct DamagedCheckpoint : SceneError {
+  using SceneError::SceneError;
+};
+
+/// Writes beside `path` and renames: the file is always whole. \throws WriteError when it cannot be written
+void writeCheckpoint(const std::string &path, const Simulation &run, const StepControl &control, const RunFacts &facts);
+
+/// Takes up a checkpoint as the state of a run. Where nothing but options and loads is other, to the bit, with what the integrator remembers if it is the
+/// same; else the integrator begins anew. Between statics and dynamics the positions are taken, at rest and at time 0.
+/// \param run made ready for the scene; its sizes are what the file must fit
+/// \param told lines for the user: what has changed, and what follows from it
+/// \return whether anything but options is other
+/// \throws DamagedCheckpoint when the file is missing, or not as it was written; SceneError when it is of another topology. Nothing has changed then
+bool readCheckpoint(const std::string &path, Simulation *run, StepControl *control, const RunFacts &facts, std::vector<std::string> *told);
 
 } // namespace tendril

@@ -4,11 +4,19 @@
 
 #include <hdf5.h>
 
+#include "tendril/model/scene.hpp"
+
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 namespace tendril {
+
+/// A file of results that cannot be written, though its folder could be.
+struct WriteError : SceneError {
+  using SceneError::SceneError;
+};
 
 /// An HDF5 handle, closed by `close`.
 template <herr_t (*close)(hid_t)> class Hdf5Handle {
@@ -48,7 +56,15 @@ public:
 
   bool has(const std::string &name) const;
   /// Whole dataset as doubles, row-major; `columns` is its last dimension (1 for a list).
-  std::vector<double> read(const std::string &name, hsize_t columns) const;
+  /// \param rows how many it has to have; another number is refused before there is memory for it
+  std::vector<double> read(const std::string &name, hsize_t columns, std::optional<hsize_t> rows = {}) const;
+  /// Text of a dataset, of no more than `most` bytes.
+  std::string readText(const std::string &name, std::size_t most) const;
+  /// Attributes of the file: a number, a text; nothing where there is none, or something else.
+  std::optional<double> number(const std::string &attribute) const;
+  std::optional<std::string> text(const std::string &attribute) const;
+  /// Writes what HDF5 still holds back and closes. \throws WriteError when that fails, as on a full disk
+  void close();
 
   void createGroup(const std::string &name);
   /// \param unit becomes the attribute `unit`, if not empty
@@ -60,6 +76,7 @@ public:
   void writeAttribute(const std::string &name, const std::string &value);
   void writeAttribute(const std::string &name, const std::vector<double> &values);
   void writeAttribute(const std::string &name, int value);
+  void writeAttribute(const std::string &name, double value);
   /// Of a group or dataset.
   void writeAttribute(const std::string &object, const std::string &name, const std::string &value);
   void writeAttribute(const std::string &object, const std::string &name, double value);

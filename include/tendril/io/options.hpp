@@ -28,7 +28,9 @@ struct Options {
   std::string output_dir = "out";
   double output_interval = 0;
   int checkpoint_interval = 0; ///< steps; 0: only at the end
-  std::string restart;         ///< checkpoint to go on from, or empty
+  std::string restart;         ///< checkpoint to go on from, `auto`, or empty
+  std::optional<double> restart_time; ///< [s]
+  std::optional<double> time_limit;   ///< [s]
   std::set<std::string> fields;
   bool error_estimate = false;
   std::optional<Accuracy> accuracy;

@@ -55,7 +55,10 @@ public:
   /// Makes all that was written safe from a kill, and visible to readers. \throws SceneError when it cannot be written
   void flush();
   void flushWhenDue();
+  /// Ends the files; nothing may be written afterwards. \throws WriteError when that fails
+  void finish();
   int frames() const { return int(times_.size()); }
+  double lastTime() const { return times_.empty() ? -1 : times_.back(); }
 
   /// Fields of a state.
   static const std::vector<std::string> &fieldNames();
@@ -78,7 +81,7 @@ private:
   std::vector<std::unique_ptr<Hdf5Series>> state_; ///< of all fields in their order; null where one is not written
   std::unique_ptr<Hdf5Series> time_, step_, critical_;
   std::vector<std::unique_ptr<Hdf5Series>> diagnostics_;
-  bool broken_ = false;                      ///< a flush failed
+  bool broken_ = false, finished_ = false;   ///< a flush failed; all is written
   Clock::time_point flushed_, described_at_; ///< long ago: the first frame goes to the files at once
   std::size_t described_ = 0;                ///< frames in the XDMF file
 

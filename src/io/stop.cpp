@@ -1,0 +1,53 @@
+#include "tendril/io/stop.hpp"
+
+#include <unistd.h>
+
+namespace tendril {
+namespace {
+
+volatile std::sig_atomic_t caught = 0;
+
+extern "C" void catchSignal(int signal) {
+  constexpr char text[] = "\ntendril: finishing the step; once more ends the run at once\n";
+  caught = signal;
+  (void)!write(STDERR_FILENO, text, sizeof text - 1);
+}
+
+} // namespace
+
+KeptSignals::KeptSignals() {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE, SIGQUIT}) {
+    before_.emplace_back(signal, (struct sigaction){});
+    sigaction(signal, nullptr, &before_.back().second);
+  }
+}
+
+void KeptSignals::restore() const {
+  for (const auto &[signal, action] : before_) sigaction(signal, &action, nullptr);
+}
+
+StopRequest::StopRequest(Clock::time_point begin, std::optional<double> limit) : begin_(begin), limit_(limit) {
+  caught = 0;
+  for (const int signal : {SIGINT, SIGTERM}) {
+    struct sigaction now = {}, before = {};
+    sigaction(signal, nullptr, &before);
+    if (before.sa_handler == SIG_IGN) continue; // as nohup and shells ask for
+    now.sa_handler = catchSignal;
+    now.sa_flags = int(SA_RESETHAND | SA_RESTART);
+    sigemptyset(&now.sa_mask);
+    sigaction(signal, &now, nullptr);
+    before_.emplace_back(signal, before);
+  }
+}
+
+StopRequest::~StopRequest() {
+  for (const auto &[signal, action] : before_) sigaction(signal, &action, nullptr);
+}
+
+bool StopRequest::asked() const { return caught != 0 || (limit_ && std::chrono::duration<double>(Clock::now() - begin_).count() >= *limit_); }
+
+std::string StopRequest::reason() const { return caught == SIGINT ? "SIGINT" : caught == SIGTERM ? "SIGTERM" : "-time_limit"; }
+
+int StopRequest::exitCode() const { return caught != 0 ? 128 + int(caught) : 75; }
+
+} // namespace tendril

@@ -1,0 +1,314 @@
+#!/usr/bin/python3
+"""Runs that end early and go on: restart.py <tendril> <source folder>. Exit codes and messages of restarts, folders in use, signals, limits of time and full
+disks; and that what goes on comes to the same bits, or to what the changed scene has to come to."""
+import glob
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+import h5py
+import numpy as np
+
+program, source = os.path.abspath(sys.argv[1]), os.path.abspath(sys.argv[2])
+sys.path.insert(0, source + "/python")
+from tendril import Trajectory
+
+rod = """gravity: [0, 0, 0]
+simulation: {mode: MODE, dt: 0.005, t_end: 3.0}
+rods:
+- name: r
+  line: {from: [0, 0, 0], to: [1, 0, 0], edges: 40}
+  material: {linear_density: 1, axial_stiffness: 1000000.0, torsional_stiffness: 1, flexural_stiffness: 1.0}
+supports:
+- {vertex: 0, type: clamp}
+"""
+pull = rod.replace("MODE", "static") + "loads:\n- {vertex: last, force: [0, 0.03, 0]}\n"
+let_go = rod.replace("MODE", "dynamic")
+cantilever = source + "/data/scenes/cantilever.yaml"
+
+
+def command(*options):
+    return [program, *(str(o) for o in options)]
+
+
+def run(code, *options, says=(), never=(), **more):
+    """Output of a run that has to end with this exit code, and say this."""
+    done = subprocess.run(command(*options), capture_output=True, text=True, timeout=300, **more)
+    text = done.stdout + done.stderr
+    assert done.returncode == code, f"exit code {done.returncode} instead of {code}: {options}\n{text}"
+    for part in [says] if isinstance(says, str) else says:
+        assert part in text, f"does not say '{part}':\n{text}"
+    for part in [*never, "PETSC ERROR", "Segmentation"]:
+        assert part not in text, f"says '{part}':\n{text}"
+    return text
+
+
+def started(*options, **more):
+    return subprocess.Popen(command(*options), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, **more)
+
+
+def until(event, process):
+    begin = time.monotonic()
+    while not event():
+        assert process.poll() is None, "the run ended by itself: " + process.stdout.read()
+        assert time.monotonic() < begin + 300, "nothing happened"
+        time.sleep(0.002)
+
+
+def rows(out):
+    return np.genfromtxt(out + "/diagnostics.csv", delimiter=",", names=True)
+
+
+def final(out):
+    with h5py.File(out + "/checkpoint.h5") as f:
+        return {name: f[name][:] for name in f if name != "facts"} | {"time": f.attrs["time"], "step": f.attrs["step"]}
+
+
+def same(a, b):
+    assert a.keys() == b.keys(), (a.keys(), b.keys())
+    for name, values in a.items():
+        assert np.array_equal(values, b[name]), name + " differs"
+
+
+def write(path, text):
+    with open(path, "w") as f:
+        f.write(text)
+    return path
+
+
+def letGo(tmp):
+    """T1 = 2 pi/3.516 L^2 sqrt(m/EI) = 1.787 s: a half period after it is let go the tip is as far on the other side, but for the higher modes in
+    the static shape, 3 % of its tip (Blevins 1979, Table 8-1)."""
+    run(0, "-scene", write(tmp + "/pull.yaml", pull), "-output_dir", tmp + "/pull")
+    text = run(0, "-scene", write(tmp + "/let_go.yaml", let_go), "-restart", tmp + "/pull/checkpoint.h5", "-output_dir", tmp + "/let_go", "-integrator", "generalized_alpha",
+               says=["no longer there: force on vertex 40 of rod 'r': [0, 0.03, 0]", "the start of dynamics", "600 steps"], never=["warning"])
+    assert "changed since" not in text, text
+    with Trajectory(tmp + "/let_go") as t:
+        times, tip = np.array(t.time), t.field("position")[:, -1, 1]
+    assert times[0] == 0 and times[-1] == 3 and len(times) == 601
+    up = [k for k in range(len(tip) - 1) if tip[k] < 0 <= tip[k + 1]]
+    down = [k for k in range(len(tip) - 1) if tip[k] >= 0 > tip[k + 1]]
+    cross = [times[k] - tip[k] * (times[k + 1] - times[k]) / (tip[k + 1] - tip[k]) for k in (down[0], up[0], down[1])]
+    period = cross[2] - cross[0]
+    assert abs(period / 1.787 - 1) < 0.02, period  # the second mode, 6.27 times as fast, shifts a zero by up to 1 %
+    assert abs(tip[0] - 0.01) < 1e-4 and abs(tip.min() + 0.01) < 4e-4, (tip[0], tip.min())
+    # The same with the clamp gone, too: the rod flies, and its momentum stays that of a rod at rest.
+    free = let_go[: let_go.index("supports")]
+    run(0, "-scene", write(tmp + "/free.yaml", free), "-restart", tmp + "/pull/checkpoint.h5", "-output_dir", tmp + "/free", "-t_end", 0.2, "-integrator", "bdf2",
+        says="no longer there: support at vertex 0 of rod 'r': clamp")
+    with Trajectory(tmp + "/free") as t:
+        p = t.field("position")
+        weight = np.ones(41)
+        weight[[0, -1]] = 0.5
+        moved = np.abs((weight[:, None] * (p[-1] - p[0])).sum(axis=0)).max() / 40
+        assert moved < 1e-7 and np.abs(p[-1] - p[0]).max() > 1e-3, moved  # -snes_rtol leaves 1e-6 of forces of 0.03 N
+    # Dynamics ends; statics from there finds the equilibrium that statics from the start finds.
+    run(0, "-scene", tmp + "/pull.yaml", "-restart", tmp + "/let_go/checkpoint.h5", "-output_dir", tmp + "/again", says=["the start of statics", "new since the checkpoint: force"])
+    with h5py.File(tmp + "/again/checkpoint.h5") as a, h5py.File(tmp + "/pull/checkpoint.h5") as b:
+        assert np.abs(a["position"][:] - b["position"][:]).max() < 1e-6
+    # More load on a state of full load.
+    run(0, "-scene", write(tmp + "/more.yaml", pull.replace("0.03", "0.05")), "-restart", tmp + "/pull/checkpoint.h5", "-output_dir", tmp + "/more",
+        says=["[0, 0.03, 0] -> [0, 0.05, 0]", "load factor begins anew"])
+    with h5py.File(tmp + "/more/checkpoint.h5") as f:
+        assert abs(f["position"][-1, 1] / (0.05 / 3) - 1) < 1e-3  # F L^3/3 EI, less the shortening by bending and by 40 edges
+    run(1, "-scene", tmp + "/pull.yaml", "-restart", tmp + "/pull/checkpoint.h5", "-output_dir", tmp + "/none", says="nothing is left to do")
+    print("let go: T1", period)
+
+
+def changes(tmp):
+    one = ["-scene", write(tmp + "/rod.yaml", let_go.replace("[0, 0, 0]\nsim", "[0, -9.81, 0]\nsim")), "-integrator", "bdf2"]
+    run(0, *one, "-t_end", 0.5, "-output_dir", tmp + "/whole")
+    run(0, *one, "-t_end", 0.25, "-output_dir", tmp + "/half")
+    start = ["-restart", tmp + "/half/checkpoint.h5"]
+    text = run(0, *one, "-t_end", 0.5, "-output_dir", tmp + "/on", *start, says="goes on from", never=["changed since", "warning"])
+    same(final(tmp + "/whole"), final(tmp + "/on"))
+    w, o = rows(tmp + "/whole"), rows(tmp + "/on")
+    for name in w.dtype.names:
+        if name != "wall_seconds":
+            assert np.array_equal(w[name][-len(o):], o[name]), name + " of the diagnostics differs"
+    run(0, *one, "-t_end", 0.3, "-dt", 0.01, "-output_dir", tmp + "/dt", *start, says="changed since the checkpoint: dt: 0.005 -> 0.01")
+    assert np.allclose(rows(tmp + "/dt")["dt"], 0.01, rtol=1e-9)
+    write(tmp + "/slow.yaml", open(tmp + "/rod.yaml").read().replace("dt: 0.005", "dt: 0.025"))
+    run(0, "-scene", tmp + "/slow.yaml", "-integrator", "bdf2", "-t_end", 0.5, "-output_dir", tmp + "/slow", *start, says="dt: 0.005 -> 0.025")
+    assert len(rows(tmp + "/slow")) == 10
+    run(0, *one, "-t_end", 0.3, "-gravity", "0,0,-9.81", "-rod_linear_density", 2, "-rod_measure", "angle", "-snes_rtol", "1e-7", "-output_dir", tmp + "/other", *start,
+        says=["gravity: [0, -9.81, 0] -> [0, 0, -9.81]", "material of rod 'r'", "law of rod 'r': measure tan", "snes_rtol: 1e-6 -> 1e-7"])
+    run(0, *one, "-t_end", 0.05, "-restart_time", 0, "-output_dir", tmp + "/zero", *start)
+    assert len(rows(tmp + "/zero")) == 10 and rows(tmp + "/zero")["time"][0] == 0.005
+    write(tmp + "/finer.yaml", open(tmp + "/rod.yaml").read().replace("edges: 40", "edges: 41"))
+    run(1, "-scene", tmp + "/finer.yaml", "-output_dir", tmp + "/finer", *start, says=["another topology", "1 rods with 41 vertices and 40 edges"])
+    assert not os.path.exists(tmp + "/finer"), "a folder was made for nothing"
+    run(1, *one, "-output_dir", tmp + "/half", *start, says="would replace those beside the checkpoint")
+    assert os.path.exists(tmp + "/half/checkpoint.h5")
+    damaged = bytearray(open(tmp + "/half/checkpoint.h5", "rb").read())
+    with h5py.File(tmp + "/half/checkpoint.h5") as f:
+        damaged[f["velocity"].id.get_offset() + 100] ^= 4
+    open(tmp + "/damaged.h5", "wb").write(damaged)
+    run(1, *one, "-output_dir", tmp + "/bad", "-restart", tmp + "/damaged.h5", says="is damaged: its checksum")
+    # A file of before there were names: read, and said so.
+    with h5py.File(tmp + "/half/checkpoint.h5") as f, h5py.File(tmp + "/old.h5", "w") as old:
+        code = 0
+        for letter in b"bdf2":
+            code = (31 * code + letter) % (10**9 + 7)
+        for name in f:
+            if not name.startswith(("facts", "cell")) and (name != "strains" or len(f[name])):
+                old[name] = f[name][:]
+        a = f.attrs
+        names = ["time", "step", "next_dt", "good_steps", "stable", "step_error", "error_sum", "last_dt", code, "rounding_sum", "dt_before"]
+        old["loop"] = [float(n if n == code else a[n]) for n in names]
+    run(0, *one, "-t_end", 0.5, "-output_dir", tmp + "/from_old", "-restart", tmp + "/old.h5", says="is of an earlier version")
+    same(final(tmp + "/whole"), final(tmp + "/from_old"))
+    print("changes told")
+
+
+def folders(tmp):
+    out = tmp + "/out"
+    base = ["-scene", cantilever, "-dt", 1e-3, "-output_dir", out]
+    run(0, *base, "-t_end", 0.05)
+    run(0, *base, "-t_end", 0.02, says=f"removed from {out}, of an earlier run: checkpoint.h5, trajectory.h5, trajectory.xdmf, diagnostics.csv, log.txt, options.yaml")
+    first = started(*base, "-t_end", 1000)
+    until(lambda: os.path.exists(out + "/trajectory.h5"), first)
+    assert not os.path.exists(out + "/checkpoint.h5"), "the checkpoint of the run before is still there"
+    run(1, *base, "-t_end", 0.02, says=["another run (process " + str(first.pid) + ")", "choose another folder"])
+    run(1, *base, "-t_end", 0.02, "-restart", "auto", says="another run")
+    first.kill()
+    first.wait()
+    run(0, *base, "-t_end", 0.02, says="removed from")
+    assert not os.path.exists(out + "/.lock")
+    print("folders are held and cleared")
+
+
+def automatic(tmp):
+    whole, out = tmp + "/whole", tmp + "/out"
+    options = ["-scene", cantilever, "-dt", 1e-3, "-integrator", "bdf2", "-t_end", 1.5, "-checkpoint_interval", 20]
+    run(0, *options, "-output_dir", whole)
+    options += ["-output_dir", out, "-restart", "auto"]
+    random.seed(3)
+    kills = 0
+    for k in range(8):
+        process = started(*options)
+        until(lambda: os.path.exists(out + "/checkpoint.h5"), process)
+        time.sleep(random.uniform(0, 0.1))
+        process.kill()
+        text = process.communicate()[0]
+        kills += process.returncode == -signal.SIGKILL
+        assert ("from the start" if k == 0 else "goes on from " + out) in text, text
+        if kills < k + 1:
+            break
+    parts = len(glob.glob(out + "/part_*"))
+    assert kills >= 2 and parts >= 1, (kills, parts)
+    # A damaged one is passed over.
+    last = out + "/checkpoint.h5"
+    with open(last, "r+b") as f:
+        f.truncate(os.path.getsize(last) // 2)
+    run(0, *options, says=["passed over: " + last, "goes on from " + out + "/part_"])
+    same(final(whole), final(out))
+    run(0, *options, says="nothing is left to do")
+    run(0, *options, "-t_end", 1.6, says="goes on from")
+    run(1, *options, "-scene", source + "/data/scenes/ring.yaml", says="another topology")
+    # Without -restart the run begins anew, and none of its parts is left to go on from.
+    run(0, *options[:-2], "-t_end", 0.01, says="part_1")
+    assert not glob.glob(out + "/part_*")
+    print("restarted automatically after", kills, "kills")
+
+
+def signals(tmp):
+    out = tmp + "/out"
+    base = ["-scene", cantilever, "-dt", 1e-3, "-output_dir", out]
+    run(0, *base, "-t_end", 2, "-output_dir", tmp + "/whole")
+
+    def interrupted(number, *options):
+        process = started(*base, *options)
+        until(lambda: os.path.exists(out + "/trajectory.h5") and os.path.getsize(out + "/log.txt") > 300, process)
+        process.send_signal(number)
+        return process, process.communicate()[0]
+
+    for number, code, name in ((signal.SIGINT, 130, "SIGINT"), (signal.SIGTERM, 143, "SIGTERM")):
+        process, text = interrupted(number, "-t_end", 1000)
+        assert process.returncode == code, (process.returncode, text)
+        assert f"stopped by {name} at time" in text and "go on with: " in text and "-restart auto" in text, text
+        state = final(out)
+        with Trajectory(out) as t:
+            assert t.time[-1] == state["time"] and np.array_equal(t.field("position")[-1], state["position"]), "the last frame is not where it stopped"
+        assert rows(out)["time"][-1] == state["time"]
+        end = 2 if state["time"] < 2 else 0
+        if end:
+            run(0, *base, "-t_end", 2, "-restart", "auto", says="goes on from")
+            same(final(tmp + "/whole"), final(out))
+    run(75, *base, "-t_end", 1000, "-time_limit", 0.7, says=["stopped by -time_limit at time", "-restart auto"])
+    assert os.path.exists(out + "/checkpoint.h5")
+    run(75, "-scene", source + "/data/scenes/elastica.yaml", "-mode", "static", "-load_steps", 100000, "-output_dir", tmp + "/static", "-time_limit", 1e-3, says="at load factor")
+    run(0, "-scene", source + "/data/scenes/elastica.yaml", "-mode", "static", "-load_steps", 100, "-output_dir", tmp + "/static", "-restart", "auto", says="load_steps: 100000 -> 100")
+    run(1, *base, "-time_limit", 0, says="-time_limit")
+    # These end the run as they end any program, without a word about PETSc; what was flushed is whole.
+    for number in (signal.SIGHUP, signal.SIGQUIT):
+        process, text = interrupted(number, "-t_end", 1000)
+        assert process.returncode == -number and "PETSC" not in text and "Caught" not in text, text
+        with Trajectory(out) as t:
+            assert len(t.time) > 0
+    pipe = subprocess.Popen(f"{' '.join(command(*base))} -t_end 1000 | head -1; echo ${{PIPESTATUS[0]}}", shell=True, executable="/bin/bash", stdout=subprocess.PIPE,
+                            stderr=subprocess.STDOUT, text=True)
+    text = pipe.communicate(timeout=300)[0]
+    assert text.split("\n")[1] == str(128 + signal.SIGPIPE) and "PETSC" not in text, text
+    # What was ignored stays so (nohup).
+    process = started(*base, "-t_end", 0.3, preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
+    until(lambda: os.path.exists(out + "/log.txt"), process)
+    process.send_signal(signal.SIGHUP)
+    text = process.communicate()[0]
+    assert process.returncode == 0, text
+    print("signals end runs in order")
+
+
+def full(tmp):
+    """No file may grow beyond a limit, as on a full disk."""
+    def limit(size):
+        return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+    out = tmp + "/out"
+    base = ["-scene", cantilever, "-dt", 1e-3, "-output_dir", out]
+    run(0, *base, "-t_end", 2, "-output_dir", tmp + "/whole")
+    with Trajectory(tmp + "/whole") as t:
+        times, positions = np.array(t.time), t.field("position")[:]
+    with_frames = 0
+    for size in (300000, 200000, 100000, 40000, 20000, 5000, 1):
+        text = run(3, *base, "-t_end", 2, "-checkpoint_interval", 20, preexec_fn=limit(size), says="cannot be written")
+        assert "disk full" in text, text
+        assert not glob.glob(out + "/*.part"), glob.glob(out + "/*")
+        if os.path.exists(out + "/checkpoint.h5"):
+            run(0, *base, "-t_end", 2, "-output_dir", tmp + "/on", "-restart", out + "/checkpoint.h5", says="goes on from")
+            same(final(tmp + "/whole"), final(tmp + "/on"))
+        try:
+            with Trajectory(out) as t:
+                n = len(t.time)
+                assert np.array_equal(t.time, times[:n]) and np.array_equal(t.field("position")[:n], positions[:n])
+                with_frames += n > 1
+        except Exception as e:  # too small for its header
+            assert size <= 40000, (size, e)
+    assert with_frames >= 1
+    # The folder is there, but nothing fits: on a real full disk, where one can be mounted.
+    disk = tmp + "/disk"
+    os.mkdir(disk)
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=256k", "none", disk], capture_output=True).returncode == 0:
+        try:
+            run(3, *base, "-t_end", 2, "-output_dir", disk + "/out", "-checkpoint_interval", 20, says="disk full")
+            if os.path.exists(disk + "/out/checkpoint.h5"):
+                run(0, *base, "-t_end", 2, "-output_dir", tmp + "/on", "-restart", disk + "/out/checkpoint.h5")
+                same(final(tmp + "/whole"), final(tmp + "/on"))
+            with Trajectory(disk + "/out") as t:
+                assert np.array_equal(t.field("position")[:], positions[: len(t.time)])
+            print("on a full disk of its own, too")
+        finally:
+            subprocess.run(["umount", disk], check=True)
+    print("full disks are told,", with_frames, "with frames")
+
+
+for test in (letGo, changes, folders, automatic, signals, full):
+    if len(sys.argv) > 3 and test.__name__ not in sys.argv[3:]:
+        continue
+    with tempfile.TemporaryDirectory() as folder:
+        test(folder)
