@@ -425,7 +425,7 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
     }
     option("output_interval", settings.output_interval);
   } else {
-    option("load_steps", std::round(1 / dt));
+    option("load_steps", std::to_string(std::lround(1 / dt)));
   }
   option("stretch", settings.mixed ? "mixed" : "primal");
   option("retraction", settings.retraction == RetractionKind::length ? "length" : "additive");

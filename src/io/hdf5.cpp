@@ -81,7 +81,7 @@ Hdf5File Hdf5File::reopen(const std::string &path) {
   return f;
 }
 
-void Hdf5File::startAppending() { written(H5Fstart_swmr_write(file_), path_ + ": cannot be opened for appending"); }
+void Hdf5File::startAppending() { written(H5Fstart_swmr_write(file_), path_ + ": cannot be written; is the disk full?"); }
 
 bool Hdf5File::has(const std::string &name) const { return H5Lexists(file_, name.c_str(), H5P_DEFAULT) > 0; }
 

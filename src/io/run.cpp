@@ -504,6 +504,10 @@ int runMain(int count, char **arguments) {
     const std::string message = dynamic_cast<const std::bad_alloc *>(&e) ? "there is not enough memory for this scene" : files.locate(e.what());
     if (rank == 0) std::fprintf(stderr, "tendril: %s\n", printable(message).c_str());
     exit_code = 1;
+    if (dynamic_cast<const WriteError *>(&e)) {
+      std::fflush(nullptr);
+      std::_Exit(3); // HDF5 tries a file again that it could not write, when MPI ends, and crashes there
+    }
   }
   (void)PetscOptionsSetValue(nullptr, "-options_left", "no"); // checked before the first step, with better words
   (void)PetscFinalize();

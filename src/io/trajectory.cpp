@@ -186,11 +186,18 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
 }
 
 TrajectoryWriter::~TrajectoryWriter() {
-  if (broken_ || finished_) return;
-  try {
-    finish();
-  } catch (const SceneError &) { // a run that goes on to its end finishes before, and tells
+  if (!broken_ && !finished_) {
+    try {
+      finish();
+    } catch (const SceneError &) { // a run that goes on to its end finishes before, and tells
+    }
   }
+  if (!broken_) return;
+  // The file stays as the last flush has left it. HDF5 would write what describes data that are not there when it closes: nothing is closed.
+  for (auto *all : {&state_, &diagnostics_})
+    for (auto &series : *all) (void)series.release();
+  for (auto *series : {&time_, &step_, &critical_}) (void)series->release();
+  new Hdf5File(std::move(file_));
 }
 
 void TrajectoryWriter::finish() {

@@ -81,7 +81,7 @@ private:
   std::vector<std::unique_ptr<Hdf5Series>> state_; ///< of all fields in their order; null where one is not written
   std::unique_ptr<Hdf5Series> time_, step_, critical_;
   std::vector<std::unique_ptr<Hdf5Series>> diagnostics_;
-  bool broken_ = false, finished_ = false;   ///< a flush failed; all is written
+  bool broken_ = false, finished_ = false;   ///< a flush failed, after which HDF5 must not touch the file; all is written
   Clock::time_point flushed_, described_at_; ///< long ago: the first frame goes to the files at once
   std::size_t described_ = 0;                ///< frames in the XDMF file
 
