@@ -7,14 +7,15 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
-#include <iterator>
+#include <iomanip>
 #include <map>
+#include <sstream>
 
 namespace tendril {
 namespace {
 
 constexpr const char *format = "tendril-checkpoint";
-constexpr int version = 2; ///< 1 had no names, hashes and checksum
+constexpr int version = 2;     ///< 1 had no names, hashes and checksum
 constexpr int most_memory = 8; ///< more than any integrator remembers
 
 /// Every step is a one-to-one map of the sum, so that no single change of what is added leaves it as it was (after FNV-1a by words).
@@ -351,9 +352,11 @@ void tellJumps(const Simulation &run, const State &state, std::vector<std::strin
     const Rod &rod = run.scene.rods[s.rod];
     const Vec3 place = rod.position[s.vertex] + s.motion.displacementAt(state.time);
     const double off = (state.position[run.elements->rods[s.rod].first_vertex + s.vertex] - place).norm();
-    if (off > 1e-6 * dimensionlessGroups(rod, run.scene.gravity).length)
-      told->push_back("warning: the support at vertex " + std::to_string(s.vertex) + " of rod '" + inOneLine(rod.name) + "' is " + textOf(off) +
-                      " m from where the checkpoint has the vertex: the first step moves it there");
+    if (off <= 1e-6 * dimensionlessGroups(rod, run.scene.gravity).length) continue;
+    std::ostringstream line;
+    line << "warning: the support at vertex " << s.vertex << " of rod '" << inOneLine(rod.name) << "' is " << std::setprecision(3) << off
+         << " m from where the checkpoint has the vertex: the first step moves it there";
+    told->push_back(line.str());
   }
 }
 
@@ -400,7 +403,8 @@ void readArrays1(const std::string &path, const Hdf5File &file, const Elements &
   }
   if (!file.has("strains")) return;
   s.strains = file.read("strains", 1);
-  if (s.strains.size() % (4 * strainRow(elements)) != 0) throw OtherRun(path + ": 'strains' does not fit the scene; restart with the scene that wrote the checkpoint");
+  if (s.strains.size() % (4 * strainRow(elements)) != 0)
+    throw OtherRun(path + ": 'strains' does not fit the scene; restart with the scene that wrote the checkpoint");
 }
 } // namespace
 
@@ -478,7 +482,8 @@ void writeCheckpoint(const std::string &path, const Simulation &run, const StepC
       out.number(name, n);
     out.longText("facts", joined(facts.facts));
     const bool turns = countsTurns(*run.elements);
-    const Contents contents{run.state, control, cellPlaces(*run.elements), turns ? cellTwists(run, run.state) : std::vector<double>(), strainRow(*run.elements)};
+    const Contents contents{run.state, control, cellPlaces(*run.elements), turns ? cellTwists(run, run.state) : std::vector<double>(),
+                            strainRow(*run.elements)};
     exchange(out, contents, *run.elements);
     out.finish();
   } catch (const SceneError &) {
@@ -517,9 +522,9 @@ bool readCheckpoint(const std::string &path, Simulation *run, StepControl *contr
       const std::size_t rods = in.count("rods", 1e12), vertices = in.count("vertices", 1e12), edges = in.count("edges", 1e12);
       if (topology_hash != facts.topology_hash || vertices != std::size_t(elements.vertices()) || edges != std::size_t(elements.edges()))
         throw OtherRun(path + ": is of another topology, " + std::to_string(rods) + " rods with " + std::to_string(vertices) + " vertices and " +
-                         std::to_string(edges) + " edges, and the scene has " + std::to_string(run->scene.rods.size()) + " with " +
-                         std::to_string(elements.vertices()) + " and " + std::to_string(elements.edges()) +
-                         "; restart with the scene that wrote the checkpoint, or one that only changes loads, supports, materials and options");
+                       std::to_string(edges) + " edges, and the scene has " + std::to_string(run->scene.rods.size()) + " with " +
+                       std::to_string(elements.vertices()) + " and " + std::to_string(elements.edges()) +
+                       "; restart with the scene that wrote the checkpoint, or one that only changes loads, supports, materials and options");
       in.longText("facts", text);
       exchange(in, c, elements);
       if (!in.finish()) lines.push_back(path + ": has no checksum: its data are taken as they are");
@@ -530,7 +535,8 @@ bool readCheckpoint(const std::string &path, Simulation *run, StepControl *contr
       same_method = integrator == facts.integrator && c.strain_row == strainRow(elements);
       const std::size_t before = lines.size();
       other = compare(old, now, !switches, &lines);
-      if (scene_hash != facts.scene_hash && lines.size() == before) lines.push_back("the text of the scene has changed since the checkpoint, but not what it says");
+      if (scene_hash != facts.scene_hash && lines.size() == before)
+        lines.push_back("the text of the scene has changed since the checkpoint, but not what it says");
     }
   } catch (const DamagedCheckpoint &) {
     throw;

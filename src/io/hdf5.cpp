@@ -173,7 +173,8 @@ void Hdf5File::write(const std::string &name, const std::vector<hsize_t> &shape,
 
 void Hdf5File::write(const std::string &name, const std::vector<hsize_t> &shape, const int *values) {
   const Hdf5Space space = H5Screate_simple(int(shape.size()), shape.data(), nullptr);
-  const Hdf5Dataset data = written(H5Dcreate2(file_, name.c_str(), H5T_STD_I32LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written; is the disk full?");
+  const Hdf5Dataset data =
+      written(H5Dcreate2(file_, name.c_str(), H5T_STD_I32LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written; is the disk full?");
   written(H5Dwrite(data, H5T_NATIVE_INT, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), path_ + ": cannot be written; is the disk full?");
 }
 
@@ -195,7 +196,8 @@ void Hdf5File::writeStrings(const std::string &name, hid_t space, std::size_t wi
   H5Tset_size(type, width);
   H5Tset_cset(type, H5T_CSET_UTF8);
   H5Tset_strpad(type, H5T_STR_NULLPAD);
-  const Hdf5Dataset data = written(H5Dcreate2(file_, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written; is the disk full?");
+  const Hdf5Dataset data =
+      written(H5Dcreate2(file_, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written; is the disk full?");
   written(H5Dwrite(data, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), path_ + ": cannot be written; is the disk full?");
 }
 

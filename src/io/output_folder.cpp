@@ -48,8 +48,8 @@ OutputFolder::OutputFolder(const std::string &path) : path_(path) {
       char owner[32] = "";
       const ssize_t n = pread(lock_, owner, sizeof owner - 1, 0);
       close(lock_);
-      throw SceneError("option -output_dir: another run" + (n > 0 ? " (process " + std::string(owner, std::size_t(n)) + ")" : std::string()) + " is writing to '" +
-                       path + "'; choose another folder");
+      throw SceneError("option -output_dir: another run" + (n > 0 ? " (process " + std::string(owner, std::size_t(n)) + ")" : std::string()) +
+                       " is writing to '" + path + "'; choose another folder");
     }
     if (isAt(lock_, lockPath())) break;
     close(lock_); // the run before has just ended and taken it away

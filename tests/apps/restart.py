@@ -55,7 +55,7 @@ def started(*options, **more):
 def until(event, process):
     begin = time.monotonic()
     while not event():
-        assert process.poll() is None, "the run ended by itself: " + process.stdout.read()
+        assert process is None or process.poll() is None, "the run ended by itself: " + process.stdout.read()
         assert time.monotonic() < begin + 300, "nothing happened"
         time.sleep(0.002)
 
@@ -190,21 +190,23 @@ def folders(tmp):
 
 def automatic(tmp):
     whole, out = tmp + "/whole", tmp + "/out"
-    options = ["-scene", cantilever, "-dt", 1e-3, "-integrator", "bdf2", "-t_end", 1.5, "-checkpoint_interval", 20]
+    options = ["-scene", cantilever, "-dt", 1e-3, "-integrator", "bdf2", "-t_end", 4, "-checkpoint_interval", 20]
     run(0, *options, "-output_dir", whole)
     options += ["-output_dir", out, "-restart", "auto"]
     random.seed(3)
     kills = 0
     for k in range(8):
         process = started(*options)
-        until(lambda: os.path.exists(out + "/checkpoint.h5") and len(glob.glob(out + "/part_*")) == k, process)
+        # Ended by itself where the machine was slow to look: then there is nothing more to kill.
+        until(lambda: process.poll() is not None or (os.path.exists(out + "/checkpoint.h5") and len(glob.glob(out + "/part_*")) == k), None)
         time.sleep(random.uniform(0, 0.1))
         process.kill()
         text = process.communicate()[0]
-        kills += process.returncode == -signal.SIGKILL
         assert ("from the start" if k == 0 else "goes on from " + out) in text, text
-        if kills < k + 1:
+        if process.returncode == 0:
             break
+        assert process.returncode == -signal.SIGKILL, text
+        kills += 1
     parts = len(glob.glob(out + "/part_*"))
     assert kills >= 2 and parts >= 1, (kills, parts)
     # A damaged one is passed over.
@@ -214,7 +216,7 @@ def automatic(tmp):
     run(0, *options, says=["passed over: " + last, "goes on from " + out + "/part_"])
     same(final(whole), final(out))
     run(0, *options, says="nothing is left to do")
-    run(0, *options, "-t_end", 1.6, says="goes on from")
+    run(0, *options, "-t_end", 4.1, says="goes on from")
     run(1, *options, "-scene", source + "/data/scenes/ring.yaml", says="another topology")
     # Without -restart the run begins anew, and none of its parts is left to go on from.
     run(0, *options[:-2], "-t_end", 0.01, says="part_1")
@@ -281,7 +283,7 @@ def full(tmp):
         times, positions = np.array(t.time), t.field("position")[:]
     environment = {**os.environ, "PMIX_MCA_gds": "hash"}  # MPI's own large files would be the first to fail
     with_frames = 0
-    for size in (300000, 200000, 100000, 40000, 20000, 5000, 1):
+    for size in (5000000, 2000000, 1000000, 300000, 100000, 40000, 20000, 5000, 1):
         text = run(3, *base, "-t_end", 2, "-checkpoint_interval", 20, preexec_fn=limit(size), env=environment, says="cannot be written")
         assert "disk full" in text, text
         assert not glob.glob(out + "/*.part"), glob.glob(out + "/*")

@@ -72,8 +72,8 @@ private:
   LoopSettings settings_;
   std::string failure_;
   std::unique_ptr<Integrator> integrator_;
-  Integrator::Stages stages_; ///< of the step under way
-  double located_ = -1;       ///< last critical load factor
+  Integrator::Stages stages_;  ///< of the step under way
+  double located_ = -1;        ///< last critical load factor
   std::optional<Planes> mode_; ///< critical mode along which the next step begins
 
   /// Error of the step under way, and what it moved: the largest of any rod, root mean square over its length [turns in rad].

@@ -27,8 +27,8 @@ struct Options {
   std::vector<std::pair<std::string, int>> rod_edges; ///< by names of rods, in order of the command line
   std::string output_dir = "out";
   double output_interval = 0;
-  int checkpoint_interval = 0; ///< steps; 0: only at the end
-  std::string restart;         ///< checkpoint to go on from, `auto`, or empty
+  int checkpoint_interval = 0;        ///< steps; 0: only at the end
+  std::string restart;                ///< checkpoint to go on from, `auto`, or empty
   std::optional<double> restart_time; ///< [s]
   std::optional<double> time_limit;   ///< [s]
   std::set<std::string> fields;
