@@ -23,7 +23,7 @@ simulation: {mode: MODE, dt: 0.005, t_end: 3.0}
 rods:
 - name: r
   line: {from: [0, 0, 0], to: [1, 0, 0], edges: 40}
-  material: {linear_density: 1, axial_stiffness: 1000000.0, torsional_stiffness: 1, flexural_stiffness: 1.0}
+  material: {linear_density: 1, linear_rotational_inertia: 1.0e-6, axial_stiffness: 1000000.0, torsional_stiffness: 1, flexural_stiffness: 1.0}
 supports:
 - {vertex: 0, type: clamp}
 """
