@@ -279,7 +279,6 @@ PetscErrorCode NewtonSolver::escapeSaddle(bool *left, bool *neutral) {
   std::vector<char> found, neutral_rods;
   const std::vector<int> negative = work_->negative;
   PetscCall(findBucklingModes(&found, &neutral_rods));
-  const Elements &e = potential_->elements();
   bool all = true, any = false; // of the rods with negative pivots
   for (int r = rods_.begin; r < rods_.end; ++r) {
     if (negative[r] > 0) {
