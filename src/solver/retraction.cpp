@@ -157,6 +157,8 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
   double *soft = work_[softness], *diag = work_[diagonal], *up = work_[upper], *rhs = work_[right], *z = work_[corner];
   const int end = last - 1;
   constexpr int most_sweeps = 10;
+  // Of a length: its last bits are no reason to move vertices, sideways and many times as far where a span is nearly straight.
+  constexpr double rounding = 4 * std::numeric_limits<double>::epsilon();
   double before = HUGE_VAL;
   for (int sweep = 0; sweep < most_sweeps; ++sweep) {
     Pack farthest(0.0);
@@ -169,7 +171,8 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
       const Vector3<Pack> e = to.edges<Pack>(s);
       const Pack length = sqrt(e.squaredNorm());
       for (int a = 0; a < 3; ++a) write(work_[direction + a] + s, select(live, Pack(e[a] / length), Pack(0.0)));
-      write(rhs + s, select(live, Pack(length - read<Pack>(work_[target] + s)), Pack(0.0)));
+      const Pack wrong = length - read<Pack>(work_[target] + s);
+      write(rhs + s, select(live && Pack(abs(wrong)) > length * Pack(rounding), wrong, Pack(0.0)));
       farthest = max(farthest, Pack(abs(read<Pack>(rhs + s)) * read<Pack>(elements_.inverseRestLength() + s)));
       const Pack compliance = read<Pack>(elements_.restLength() + s) / read<Pack>(elements_.axialStiffness() + s);
       write(diag + s, select(live, Pack(read<Pack>(soft + s) + read<Pack>(soft + s + 1) + compliance), Pack(1.0)));
