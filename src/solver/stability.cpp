@@ -131,14 +131,19 @@ void NewtonSolver::beginMode() {
   }
 }
 
+/// A rod's share of the mass of the mode in work_->increment.
+double NewtonSolver::massOf(int r) const {
+  const RodRange &rod = potential_->elements().rods[r];
+  double mass = 0;
+  for (int a = 0; a < slot_size; ++a)
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) mass += work_->metric[a][s] * work_->increment[a][s] * work_->increment[a][s];
+  return mass;
+}
+
 /// Makes the mode in work_->increment one of unit mass; returns the root of the mass it had.
 double NewtonSolver::normaliseMode() {
   double mass = 0;
-  for (int r = rods_.begin; r < rods_.end; ++r) {
-    const RodRange &rod = potential_->elements().rods[r];
-    for (int a = 0; a < slot_size; ++a)
-      for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) mass += work_->metric[a][s] * work_->increment[a][s] * work_->increment[a][s];
-  }
+  for (int r = rods_.begin; r < rods_.end; ++r) mass += massOf(r);
   for (double &d : work_->increment) d /= std::sqrt(mass);
   return std::sqrt(mass);
 }
@@ -220,6 +225,7 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
       softening.subtractFrom(potential_->blocks());
     } else {
       fill(work_->indefinite, true);
+      fill(work_->last_shift, 0.0); // one of an iterate far away would drown the mode
       PetscCall(shiftUntilPositive(false));
     }
     const bool definite = buckling && report_.zero_pivots == 0;
@@ -238,29 +244,30 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
     };
     auto normalise = [&] {
       for (int r = rods_.begin; r < rods_.end; ++r) {
-        double square = 0;
-        const RodRange &rod = e.rods[r];
-        for (int a = 0; a < slot_size; ++a)
-          for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) square += work_->metric[a][s] * std::pow(work_->increment[a][s], 2);
-        for (int a = 0; a < slot_size && square > 0; ++a)
-          for (int s = rod.first_slot; s < rod.vertexEnd() + 2; ++s) work_->increment[a][s] /= std::sqrt(square);
+        const double size = std::sqrt(massOf(r));
+        for (int a = 0; a < slot_size && size > 0; ++a)
+          for (int s = e.rods[r].first_slot; s < e.rods[r].vertexEnd() + 2; ++s) work_->increment[a][s] /= size;
       }
     };
     beginMode();
     normalise();
     Planes right = soften();
-    for (int k = 0; k < 100 && !done; ++k) {
+    std::vector<double> before(neutral->size(), HUGE_VAL);
+    bool settled = false;
+    for (int k = 0; k < 100 && !settled; ++k) {
       PetscCall(solveLinear(right, work_->increment));
       const Planes soft = soften();
-      done = true;
+      done = settled = true;
       for (int r = rods_.begin; r < rods_.end; ++r) {
         if (negative[r] == 0) continue;
         const double stiffness = dot(e.rods[r], work_->increment, right), softness = dot(e.rods[r], work_->increment, soft);
-        const double noise = rounding * std::abs(stiffness) + hessianNoise(r, work_->increment);
+        const double noise = rounding * std::abs(stiffness) + hessianNoise(r, work_->increment), change = softness - stiffness - before[r];
+        before[r] = softness - stiffness;
         (*found)[r] = k >= 5 && softness - stiffness > noise;
         // Compression that makes up for no mode's stiffness leaves a definite Hessian: its negative pivots are rounding.
         (*neutral)[r] = std::abs(softness - stiffness) <= noise || (definite && !(softness > 0.5 * stiffness));
         done = done && (*found)[r];
+        settled = settled && ((*found)[r] || (k >= 5 && (*neutral)[r] && std::abs(change) < 1e-3 * noise));
       }
       normalise();
       right = soften();

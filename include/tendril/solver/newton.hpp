@@ -173,6 +173,7 @@ private:
   std::string farthest();
   std::string roundingMessage(int rod, double size) const;
   void beginMode();
+  double massOf(int r) const;
   double normaliseMode();
   double turningOf(int rod) const;
   PetscErrorCode findBucklingModes(std::vector<char> *found, std::vector<char> *neutral);
