@@ -201,8 +201,8 @@ PetscErrorCode NewtonSolver::softestMode(double *softest, Planes *mode) {
 
 /// Directions of negative curvature of the rods with negative pivots, in work_->increment. With the Hessian K = E - G split into the part E without
 /// compression and the effect G of compression, iterating v <- E^-1 G v gives the first buckling mode, the smoothest way out. Where compression
-/// is not the cause, or leaves motions without stiffness, inverse iteration with the shifted Hessian finds the lowest mode. `neutral`: rods whose mode
-/// costs no energy, to rounding, and that nothing goes down from: a turn of the whole rod about an axis, say.
+/// is not the cause, or leaves motions without stiffness, inverse iteration with the shifted Hessian finds the lowest mode, beginning from the last shift.
+/// `neutral`: rods whose mode costs no energy, to rounding, and that nothing goes down from: a turn of the whole rod about an axis, say.
 PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::vector<char> *neutral) {
   // Of the energies that balance, stiff edges leave 1e-7 by rounding; and what the forces are out of balance by, a neutral motion is curved by.
   const double rounding = std::clamp(10 * report_.residual.force, 1e-7, 1e-5);
@@ -214,8 +214,10 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
   found->assign(work_->wanted.size(), false);
   neutral->assign(work_->wanted.size(), false);
   bool regular, done = false;
-  for (const bool buckling : {true, false}) {
+  enum class Try { buckling, shifted, shifted_anew };
+  for (const Try way : {Try::buckling, Try::shifted, Try::shifted_anew}) {
     if (done) break;
+    const bool buckling = way == Try::buckling;
     for (int r = rods_.begin; r < rods_.end; ++r) potential_->assembleRod(r, buckling ? HessianKind::uncompressed : HessianKind::exact);
     EdgeBlocks softening = exact;
     if (buckling) {
@@ -225,7 +227,8 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
       softening.subtractFrom(potential_->blocks());
     } else {
       fill(work_->indefinite, true);
-      fill(work_->last_shift, 0.0); // one of an iterate far away would drown the mode
+      if (way == Try::shifted_anew) // the last shift, of an iterate far away, drowned the mode
+        for (std::vector<double> *shift : {&work_->shift, &work_->last_shift}) fill(*shift, 0.0);
       PetscCall(shiftUntilPositive(false));
     }
     const bool definite = buckling && report_.zero_pivots == 0;
@@ -253,7 +256,7 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
     normalise();
     Planes right = soften();
     std::vector<double> before(neutral->size(), HUGE_VAL);
-    bool settled = false;
+    bool settled = false; // what more iterations would not change
     for (int k = 0; k < 100 && !settled; ++k) {
       PetscCall(solveLinear(right, work_->increment));
       const Planes soft = soften();
@@ -267,12 +270,12 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
         // Compression that makes up for no mode's stiffness leaves a definite Hessian: its negative pivots are rounding.
         (*neutral)[r] = std::abs(softness - stiffness) <= noise || (definite && !(softness > 0.5 * stiffness));
         done = done && (*found)[r];
-        settled = settled && ((*found)[r] || (k >= 5 && (*neutral)[r] && std::abs(change) < 1e-3 * noise));
+        settled = settled && ((*found)[r] || (k >= 5 && std::abs(softness - stiffness) <= noise && std::abs(change) < 1e-3 * noise));
       }
       normalise();
       right = soften();
     }
-    done = done || definite;
+    done = done || definite || (settled && !buckling);
   }
   for (int r = rods_.begin; r < rods_.end; ++r) potential_->assembleRod(r, potential_->step().hessian);
   PetscFunctionReturn(0);
