@@ -485,6 +485,17 @@ class Trajectory:
         group = self._file["estimate"]
         return {**{name: data[:] for name, data in group.items()}, **_attributes(group)}
 
+    @property
+    def summary(self):
+        """What the last state comes to: attributes of /summary by name, reactions as (supports, 3); None until the run has
+        ended."""
+        if "summary" not in self._file:
+            return None
+        found = _attributes(self._file["summary"])
+        for name in {"reaction", "reaction_moment"} & set(found):
+            found[name] = found[name].reshape(-1, 3)
+        return None if np.isnan(found["time"]) else found
+
     def unit(self, name):
         """Unit of a dataset: a field, column of the diagnostics, parameter of the material; 1 of pure numbers.
         Of equal names a field goes first: `diagnostics/twist` is the energy [J]."""

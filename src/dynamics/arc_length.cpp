@@ -407,6 +407,7 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     std::swap(direction, end);
     potential.commit(state);
     EnergyBudget energy = energyOf(state);
+    Work work = staticWork(potential.scene(), potential.elements(), start, state, potential.start(), potential.iterate());
     ++taken;
     std::optional<CriticalPoint> critical;
     const bool locates = settings_.bifurcation != Bifurcation::off;
@@ -430,12 +431,14 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
       }
       PetscCall(tangent(&direction));
       energy = energyOf(state);
+      work = staticWork(potential.scene(), potential.elements(), start, state);
     }
     Diagnostics row;
     row.time = state.time;
     row.dt = std::sqrt(product(last_, last_));
     row.energy = energy;
-    row.dissipated = before.total() - energy.total();
+    row.work = work;
+    row.dissipated = before.total() + work.total() - energy.total();
     before = energy;
     row.newton_iterations = iterations_;
     row.negative_pivots = negative_;

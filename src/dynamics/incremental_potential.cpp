@@ -442,6 +442,27 @@ IncrementalPotential::Residual IncrementalPotential::residual() {
   return rates;
 }
 
+std::array<Vec3, 2> IncrementalPotential::supportAction(const State &start, int s) {
+  const Support &support = scene_.supports[s];
+  std::array<Vec3, 2> action{Vec3::Zero(), Vec3::Zero()};
+  if (support.holdsPosition()) {
+    const int slot = elements_.rods[support.rod].slot(support.vertex), v = elements_.rods[support.rod].first_vertex + support.vertex;
+    const Vec3 moved = iterate_.displacementAt(slot, start_);
+    Vec3 velocity = moved / step_.dt, acceleration = (velocity - start.velocity[v]) / step_.dt;
+    if (const StageRule *rule = step_.rule) {
+      velocity += rule->velocity.atVertex(v);
+      acceleration = (rule->mass * velocity + rule->acceleration.atVertex(v)) / step_.dt;
+    }
+    // What methods remember of held vertices is nothing, which does not matter to them: the velocity that dissipates is that of the way.
+    const Vec3 astray = moved / (step_.time - start_time_) - velocity;
+    const double alpha = scene_.rods[support.rod].material.mass_damping_coefficient;
+    action[0] = gradient(support.rod).equilibrium.vector(0, slot) + elements_.mass()[slot] * (alpha * astray - acceleration);
+  }
+  if (const int frame = elements_.support_slot[s]; frame >= 0)
+    for (const auto &term : terms_) action[1] += term->momentOn(iterate_, support.rod, frame);
+  return action;
+}
+
 /// From the middle of a step an edge at the start, in the middle and at the end lies in one plane, so that the minimal rotations of the two halves make up
 /// that of the whole step: its spin over the step is twice that over its half, with no holonomy between. Where the guess goes along a curve, the spin is
 /// measured from the frames carried along it, by a second move.

@@ -132,6 +132,7 @@ void RodAccess::setTurns(State &next, std::vector<double> twists, const std::vec
 void RodAccess::accept(State &&next) {
   next.memory.clear();
   next.strains.clear();
+  next.support_actions.clear();
   next.last_dt = next.dt_before = 0;
   if (!dynamic_) next.time = 0;
   state_ = std::move(next);

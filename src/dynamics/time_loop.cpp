@@ -90,6 +90,8 @@ PetscErrorCode TimeLoop::solveStages(const State &start, const Step &step, Newto
   IncrementalPotential &potential = solver_.potential();
   const bool dissipates = potential.scene().stiffnessDissipates();
   stages_.clear();
+  actions_.clear();
+  solver_.on_block = [&](RodSet rods) { noteActions(start, rods); };
   for (bool more = true; more;) {
     StageRule rule = integrator_->stage(start, step.dt, stages_);
     Step stage = step;
@@ -100,6 +102,7 @@ PetscErrorCode TimeLoop::solveStages(const State &start, const Step &step, Newto
     if (dissipates && rule.tangent_rates) behind = strainsBehind(solver_, start, stage);
     if (!behind.empty()) rule.damping_past = {{-1, behind.data()}};
     NewtonReport one;
+    actions_.emplace_back(2 * moving_.size());
     PetscCall(solver_.solve(start, stage, &one));
     const int iterations = one.iterations;
     one.iterations += report->iterations; // stages follow each other; blocks of rods do not
@@ -119,6 +122,47 @@ PetscErrorCode TimeLoop::solveStages(const State &start, const Step &step, Newto
   PetscFunctionReturn(0);
 }
 
+/// What the moving supports of some rods do at the stage just solved.
+void TimeLoop::noteActions(const State &start, RodSet rods) {
+  for (std::size_t k = 0; k < moving_.size(); ++k) {
+    const int rod = solver_.potential().scene().supports[moving_[k]].rod;
+    if (rod < rods.begin || rod >= rods.end) continue;
+    const std::array<Vec3, 2> action = solver_.potential().supportAction(start, moving_[k]);
+    std::copy(action.begin(), action.end(), actions_.back().begin() + 2 * k);
+  }
+}
+
+/// Of the step just solved, without what the inertia of held vertices takes. Weights of what is not remembered are those of the last stage.
+Work TimeLoop::dynamicWork(const State &start, double h) const {
+  const IncrementalPotential &potential = solver_.potential();
+  const Scene &scene = potential.scene();
+  Work work{workOfLoads(scene, potential.elements(), potential.start(), potential.iterate(), 1, 1), 0};
+  if (moving_.empty()) return work;
+  const std::vector<double> weights = integrator_->forceWeights(start, h, actions_.size());
+  const std::size_t n = actions_.back().size();
+  SupportActions mean(n, Vec3::Zero());
+  for (std::size_t j = 0; j < weights.size(); ++j)
+    for (std::size_t k = 0; k < n; ++k) {
+      const std::size_t past = (j - actions_.size()) * n + k;
+      mean[k] += weights[j] * (j < actions_.size() ? actions_[j][k] : past < start.support_actions.size() ? start.support_actions[past] : actions_.back()[k]);
+    }
+  work.supports = workOfSupports(scene, potential.elements(), potential.start(), potential.iterate(), start.time, potential.step().time, mean);
+  return work;
+}
+
+/// Kinetic energy of the vertices that moving supports hold [J].
+double TimeLoop::movedKinetic(const State &state) const {
+  const IncrementalPotential &potential = solver_.potential();
+  double sum = 0;
+  for (const int s : moving_) {
+    const Support &support = potential.scene().supports[s];
+    const RodRange &rod = potential.elements().rods[support.rod];
+    if (support.holdsPosition())
+      sum += 0.5 * potential.elements().mass()[rod.slot(support.vertex)] * state.velocity[rod.first_vertex + support.vertex].squaredNorm();
+  }
+  return sum;
+}
+
 /// Velocities and memory of the state; held vertices have those of their supports.
 void TimeLoop::finishStages(State &state, double h) {
   const IncrementalPotential &potential = solver_.potential();
@@ -133,6 +177,11 @@ void TimeLoop::finishStages(State &state, double h) {
   if (keeps && !integrator_->endsAtStage()) // as far beyond the middle
     std::transform(state.strains.begin(), state.strains.end(), stages_.back().strains.begin(), state.strains.begin(),
                    [](double start, double middle) { return 2 * middle - start; });
+  if (integrator_->remembersActions() > 0 && !moving_.empty()) {
+    std::vector<Vec3> &kept = state.support_actions;
+    kept.insert(kept.begin(), actions_.back().begin(), actions_.back().end());
+    kept.resize(std::min(kept.size(), integrator_->remembersActions() * actions_.back().size()));
+  }
   integrator_->finish(state, h, stages_);
   if (!state.memory.empty()) state.dt_before = std::exchange(state.last_dt, h);
   if (integrator_->leavesChords()) return; // of held vertices, too
@@ -212,6 +261,8 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
   // A run that begins has no step behind it, whatever the loop has run before.
   const bool goes_on = !std::isnan(control.energy) && (settings_.dynamic || state.time > 0);
   if (!goes_on) control.energy = energyBudget(potential.scene(), potential.elements(), state, settings_.dynamic ? 1 : state.time).total();
+  moving_ = movingSupports(potential.scene());
+  Work work; // since the last row
   *finished = false;
   const bool plain = !settings_.dynamic || (integrator_->leavesChords() && !adapts && !settings_.estimate_error);
   State next = state; // what the blocks that have converged come to; the state itself stays as it is until all have
@@ -231,14 +282,17 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     if (plain) { // each block is committed while it is in the cache
       solver_.on_block = [&](RodSet rods) {
         potential.commit(next, rods);
+        if (settings_.dynamic) noteActions(state, rods);
         for (int r = rods.begin; r < rods.end; ++r) addEnergy(next, r);
       };
+      actions_.assign(1, SupportActions(2 * moving_.size()));
       std::optional<Guess> guess;
       if (mode_) guess = alongMode(state, step);
       PetscCall(solver_.solve(state, step, &report, Seek::minimum, guess ? &*guess : nullptr));
       solver_.on_block = nullptr;
     } else {
       PetscCall(solveStages(state, step, &report));
+      solver_.on_block = nullptr;
       if (report.converged && (adapts || settings_.estimate_error)) error = stepError(state, h);
       if (report.converged && adapts && !adapt(h, dt_min, error)) { // the state was not touched
         ++rejected;
@@ -253,19 +307,26 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     const bool passed = report.first_negative_pivots > 0 || (asks && report.shifts > 0 && state.time > 0);
     if (detects && stable && passed && located_ <= state.time) {
       bool moved = false;
+      const State before = state;
       PetscCall(locate(state, step, &moved));
       *finished = moved && settings_.bifurcation == Bifurcation::stop;
       if (*finished) PetscFunctionReturn(0);
       if (moved) {
+        work += staticWork(potential.scene(), potential.elements(), before, state);
         next = state;
         stable = false;
         continue;
       }
     }
     if (report.converged) mode_.reset();
+    if (report.converged && settings_.dynamic) {
+      work = dynamicWork(state, h);
+      work.supports -= movedKinetic(state);
+    }
     if (report.converged && plain) {
       next.time = step.time;
       next.step = state.step + 1;
+      if (!settings_.dynamic) work += staticWork(potential.scene(), potential.elements(), state, next, potential.start(), potential.iterate());
       std::swap(state, next);
     } else if (report.converged) {
       finishStages(state, h);
@@ -293,11 +354,13 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
       dt = std::min(2 * dt, settings_.dt);
       good = 0;
     }
+    if (settings_.dynamic) work.supports += movedKinetic(state);
     Diagnostics row;
     row.time = state.time;
     row.dt = h;
     row.energy = energy;
-    row.dissipated = control.energy - row.energy.total();
+    row.work = std::exchange(work, {});
+    row.dissipated = control.energy + row.work.total() - row.energy.total();
     control.energy = row.energy.total();
     row.newton_iterations = report.iterations;
     row.line_search_trials = report.trials;

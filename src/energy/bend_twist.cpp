@@ -34,6 +34,10 @@ public:
                                            : assemble<Measure::angle>(configuration, rod, hessian, out);
   }
 
+  Vec3 momentOn(const Configuration &configuration, int rod, int frame) const override {
+    return tendril::momentOn(elements_, cells_, configuration, rod, frame);
+  }
+
 private:
   const Scene &scene_;
   const Elements &elements_;

@@ -70,7 +70,7 @@ RodStrains rodStrains(const Scene &scene, const Elements &elements, const State 
 RodActions rodActions(const Scene &scene, const Elements &elements, const State &state, double motion_time, double load_factor) {
   const Configuration c = configurationOf(state, scene, elements, motion_time);
   RodActions out{std::vector<Vec3>(state.director.size()), std::vector<Vec3>(state.position.size(), Vec3::Zero()),
-                 std::vector<Vec3>(scene.supports.size(), Vec3::Zero())};
+                 std::vector<Vec3>(scene.supports.size(), Vec3::Zero()), std::vector<Vec3>(scene.supports.size(), Vec3::Zero())};
   for (std::size_t r = 0; r < elements.rods.size(); ++r) {
     const RodRange &rod = elements.rods[r];
     for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
@@ -94,14 +94,11 @@ RodActions rodActions(const Scene &scene, const Elements &elements, const State 
     const Vec3 by_edge0 = -Eigen::Map<const Vec3>(&d[0]), by_edge1 = Eigen::Map<const Vec3>(&d[8]);
     if (place.kind != CellPlace::behind) out.force[place.edge0] += by_edge0;
     if (place.kind != CellPlace::before) out.force[place.edge1] += by_edge1;
-    // Derivative of the energy by turning the second frame or, which is the same, the first one backwards.
-    if (place.kind != CellPlace::before)
-      out.moment[place.vertex] += f[1].length * f[1].tangent.cross(by_edge1) + d[7] * f[1].tangent;
-    else if (place.at_end)
-      out.moment[place.vertex] -= f[0].length * f[0].tangent.cross(by_edge0) + d[3] * f[0].tangent;
+    if (place.kind != CellPlace::before || place.at_end) out.moment[place.vertex] += cellMoment(f[0], f[1], k, d);
   });
   for (std::size_t k = 0; k < scene.supports.size(); ++k) {
     const Support &support = scene.supports[k];
+    if (const int frame = elements.support_slot[k]; frame >= 0) out.reaction_moment[k] = momentOn(elements, elements.cells(), c, support.rod, frame);
     if (!support.holdsPosition()) continue;
     const Rod &rod = scene.rods[support.rod];
     const RodRange &range = elements.rods[support.rod];

@@ -1,5 +1,5 @@
 /// Gravity, centrifugal and nodal forces, and couples on edges.
-#include "tendril/energy/term.hpp"
+#include "tendril/energy/work.hpp"
 
 namespace tendril {
 namespace {
@@ -57,12 +57,8 @@ public:
       }
       sum -= 0.5 * factor_ * reduce(centrifugal);
     }
-    for (const Couple &m : couples_[r]) {
-      const Vec3 t = c.frameAt(m.slot).tangent, axis = m.tangent.cross(t);
-      const double sine = axis.norm(), turning = sine > 0 ? std::atan2(sine, m.tangent.dot(t)) / sine : 1;
-      const Vec3 mean = (m.tangent + t).normalized();
-      sum -= factor_ * ((m.torque + m.moment.dot(mean)) * (c[Configuration::spin][m.slot] - m.spin) + turning * m.moment.dot(axis));
-    }
+    for (const Couple &m : couples_[r])
+      sum -= factor_ * coupleWork(m.moment, m.torque, m.tangent, c.frameAt(m.slot).tangent, c[Configuration::spin][m.slot] - m.spin);
     return sum;
   }
 

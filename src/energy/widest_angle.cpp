@@ -7,7 +7,7 @@ namespace tendril {
 
 void WidestAngle::include(const Scene &scene, const Elements &elements, const State &state) {
   for (int r = 0; r < int(scene.rods.size()); ++r) {
-    if (scene.rods[r].material.isCable() || scene.rods[r].measure != Measure::tan) continue;
+    if (scene.rods[r].material.isCable() || (scene.rods[r].measure != Measure::tan && !every_measure)) continue;
     const RodRange &range = elements.rods[r];
     auto frameOf = [&](int i) {
       const Vec3 edge = state.position[range.first_vertex + (i + 1) % range.vertices] - state.position[range.first_vertex + i];
@@ -23,7 +23,7 @@ void WidestAngle::include(const Scene &scene, const Elements &elements, const St
       const double trace = tangents + directors + tangents * directors - before.tangent.dot(f.director) * before.director.dot(f.tangent);
       if (trace < bound) {
         const double turning = std::acos(std::clamp(tangents, -1.0, 1.0)), twist = std::abs(halfAngleBetween(before, f).angle());
-        if (std::max(turning, twist) > angle) *this = {std::max(turning, twist), r, i, state.time};
+        if (std::max(turning, twist) > angle) *this = {std::max(turning, twist), r, i, state.time, every_measure};
         bound = 1 + 2 * std::cos(angle);
       }
       before = f;

@@ -15,7 +15,7 @@ namespace tendril {
 namespace {
 
 constexpr const char *format = "tendril-checkpoint";
-constexpr int version = 2;     ///< 1 had no names, hashes and checksum
+constexpr int version = 3;     ///< 1 had no names, hashes and checksum, 2 no actions of supports
 constexpr int most_memory = 8; ///< more than any integrator remembers
 
 /// Every step is a one-to-one map of the sum, so that no single change of what is added leaves it as it was (after FNV-1a by words).
@@ -84,6 +84,7 @@ std::string inOneLine(std::string text) {
 class Writer {
 public:
   static constexpr bool reads = false;
+  static constexpr std::size_t format_version = version;
   Writer(const std::string &path) : file_(Hdf5File::create(path)) {}
   void number(const char *name, double value) {
     file_.writeAttribute(std::string(name), value);
@@ -124,6 +125,7 @@ private:
 class Reader {
 public:
   static constexpr bool reads = true;
+  std::size_t format_version = 0; ///< of the file
   Reader(const std::string &path, const Hdf5File &file) : path_(path), file_(file) {
     std::error_code none;
     bytes_ = std::filesystem::file_size(path, none);
@@ -251,6 +253,10 @@ template <class Archive, class AnyContents> void exchange(Archive &a, AnyContent
     a.array("memory_edge_" + std::to_string(n), s.memory[n].edge, elements.edges());
   }
   a.array("strains", s.strains, strains);
+  if (a.format_version < 3) return;
+  std::size_t actions = s.support_actions.size();
+  whole("remembered_actions", actions, 1e15);
+  a.array("support_actions", s.support_actions, actions);
 }
 
 using Kind = RunFacts::Kind;
@@ -334,6 +340,7 @@ void beginAnew(const Simulation &run, State *state, std::vector<std::string> *to
   }
   state->memory.clear();
   state->strains.clear();
+  state->support_actions.clear();
   state->last_dt = state->dt_before = 0;
   const Configuration c = configurationOf(*state, run.scene, *run.elements, state->time);
   for (std::size_t r = 0; r < run.elements->rods.size(); ++r) {
@@ -511,8 +518,10 @@ bool readCheckpoint(const std::string &path, Simulation *run, StepControl *contr
       std::string read, mode, integrator, scene_hash, topology_hash, text;
       in.text("format", read);
       if (read != format) in.fail("is no checkpoint");
-      if (const std::size_t v = in.count("format_version", 1e9); v != version)
-        throw OtherRun(path + ": is of format " + std::to_string(v) + ", and this version reads format " + std::to_string(version) + "; take a newer one");
+      in.format_version = in.count("format_version", 1e9);
+      if (in.format_version < 2 || in.format_version > version)
+        throw OtherRun(path + ": is of format " + std::to_string(in.format_version) + ", and this version reads formats 1 to " + std::to_string(version) +
+                       "; take a newer one");
       in.text("mode", mode);
       in.text("integrator", integrator);
       double dt;
@@ -552,6 +561,7 @@ bool readCheckpoint(const std::string &path, Simulation *run, StepControl *contr
   if (!same_method) {
     s.memory.clear();
     s.strains.clear();
+    s.support_actions.clear();
     s.last_dt = s.dt_before = 0;
   }
   if (switches) {

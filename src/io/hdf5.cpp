@@ -28,6 +28,11 @@ template <class Open> hid_t patiently(Open open) {
   return file;
 }
 
+/// An attribute, new or there already: a file that is appended to takes other values, but nothing new.
+hid_t attributeOf(hid_t to, const std::string &name, hid_t type, hid_t space) {
+  return H5Aexists(to, name.c_str()) > 0 ? H5Aopen(to, name.c_str(), H5P_DEFAULT) : H5Acreate2(to, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT);
+}
+
 void attach(hid_t to, const std::string &name, const std::string &value) {
   const Hdf5Type type = H5Tcopy(H5T_C_S1);
   H5Tset_size(type, std::max<std::size_t>(value.size(), 1));
@@ -40,13 +45,13 @@ void attach(hid_t to, const std::string &name, const std::string &value) {
 void attach(hid_t to, const std::string &name, const std::vector<double> &values) {
   const hsize_t size = values.size();
   const Hdf5Space space = H5Screate_simple(1, &size, nullptr);
-  const Hdf5Attribute a = H5Acreate2(to, name.c_str(), H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT);
+  const Hdf5Attribute a = attributeOf(to, name, H5T_IEEE_F64LE, space);
   written(H5Awrite(a, H5T_NATIVE_DOUBLE, values.data()), write_failed);
 }
 
 template <class Number> void attachScalar(hid_t to, const std::string &name, Number value, hid_t stored, hid_t native) {
   const Hdf5Space space = H5Screate(H5S_SCALAR);
-  const Hdf5Attribute a = H5Acreate2(to, name.c_str(), stored, space, H5P_DEFAULT, H5P_DEFAULT);
+  const Hdf5Attribute a = attributeOf(to, name, stored, space);
   written(H5Awrite(a, native, &value), write_failed);
 }
 void attach(hid_t to, const std::string &name, double value) { attachScalar(to, name, value, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE); }
@@ -209,6 +214,7 @@ void Hdf5File::writeAttribute(const std::string &name, double value) { attach(fi
 void Hdf5File::writeAttribute(const std::string &object, const std::string &name, const std::string &value) { attach(objectAt(object), name, value); }
 void Hdf5File::writeAttribute(const std::string &object, const std::string &name, double value) { attach(objectAt(object), name, value); }
 void Hdf5File::writeAttribute(const std::string &object, const std::string &name, int value) { attach(objectAt(object), name, value); }
+void Hdf5File::writeAttribute(const std::string &object, const std::string &name, const std::vector<double> &values) { attach(objectAt(object), name, values); }
 
 Hdf5Object Hdf5File::objectAt(const std::string &name) const {
   return checked(H5Oopen(file_, name.c_str(), H5P_DEFAULT), path_ + ": has nothing of the name '" + name + "'");

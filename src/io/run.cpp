@@ -9,8 +9,9 @@
 #include "tendril/io/options.hpp"
 #include "tendril/io/output_folder.hpp"
 #include "tendril/io/progress.hpp"
-#include "tendril/io/text.hpp"
 #include "tendril/io/stop.hpp"
+#include "tendril/io/summary.hpp"
+#include "tendril/io/text.hpp"
 #include "tendril/solver/events.hpp"
 
 #include <algorithm>
@@ -319,10 +320,8 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   WidestAngle widest{pi / 6};
   widest.include(run.scene, *run.elements, run.state); // told above
   widest.rod = -1;
-  // Without couples, forces and motions nothing puts energy in: where it rises by a part of the motion's own, the method does. Weight is a potential.
-  const bool closed = o.loop.dynamic && run.scene.forces.empty() && run.scene.moments.empty() && run.scene.rotation.angular_velocity.isZero(0) &&
-                      std::none_of(run.scene.supports.begin(), run.scene.supports.end(), [](const Support &s) { return s.motion.moves(); });
-  double dissipated = 0, gained = 0, most_kinetic = 0, little = 0; // little: what rounding moves, 1e-9 of bending by one radian
+  // Where energy rises by more than the work of loads and supports, the method has put it in: that is measured by the motion's own and by that work.
+  double dissipated = 0, gained = 0, work = 0, most_kinetic = 0, little = 0; // little: what rounding moves, 1e-9 of bending by one radian
   for (std::size_t r = 0; r < run.scene.rods.size(); ++r) {
     const Material &m = run.scene.rods[r].material;
     const double length = run.potential->length(int(r)), stiff = std::max(m.flexural_stiffness[0], m.flexural_stiffness[1]);
@@ -349,6 +348,7 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
     }
     progress.step(row);
     dissipated += row.dissipated;
+    work += std::abs(row.work.total());
     most_kinetic = std::max(most_kinetic, row.energy.kinetic);
     gained = std::max(gained, -dissipated);
     if (!o.loop.dynamic && row.negative_pivots > 0 && !warned) {
@@ -392,6 +392,8 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   const bool stopped = !finished && failure.empty();
   if (stopped && trajectory.lastTime() < run.state.time) trajectory.writeFrame(run.state);
   PetscCall(PetscLogEventBegin(events().output, 0, 0, 0, 0));
+  const Summary at_end = summarize(run.scene, *run.elements, run.state, o.loop.dynamic ? 1 : run.state.time);
+  trajectory.writeSummary(at_end);
   trajectory.finish();
   if (!arclength) writeCheckpoint(checkpoint, run, loop.control, facts);
   PetscCall(PetscLogEventEnd(events().output, 0, 0, 0, 0));
@@ -400,13 +402,15 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   summary << steps << " steps, " << iterations << " Newton iterations (mean " << std::setprecision(3) << (steps ? double(iterations) / double(steps) : 0)
           << "), " << rejected << " rejected, " << last.wall_seconds << " s, results in " << o.output_dir;
   progress.say(summary.str());
-  if (closed && gained > 0.1 * most_kinetic + little) {
+  for (const std::string &line : describe(at_end, run.scene)) progress.say(line);
+  const double moved = most_kinetic + work;
+  if (o.loop.dynamic && gained > 0.1 * moved + little) {
     std::ostringstream growth;
-    growth << "the energy rose by " << std::setprecision(2) << gained / most_kinetic
-           << " of the largest kinetic energy, with nothing to put it in but -integrator " << o.loop.integrator.name
+    growth << "the energy rose by " << std::setprecision(2) << gained / moved << " of the largest kinetic energy"
+           << (work > 0 ? " and the work of loads and supports" : "") << ", with nothing to put it in but -integrator " << o.loop.integrator.name
            << " in steps too long for it: shorten -dt, or take bdf2 or energy_momentum";
     // A method that is unstable has made most of the motion itself.
-    if (finished && gained > 0.5 * most_kinetic + little) {
+    if (finished && gained > 0.5 * moved + little) {
       finished = false;
       failure = growth.str();
     } else

@@ -47,6 +47,7 @@ const Field fields[] = {
     {"force", "N", On::edges, 3, From::actions, [](const Snapshot &s) { return s.actions.force[0].data(); }},
     {"moment", "N m", On::vertices, 3, From::actions, [](const Snapshot &s) { return s.actions.moment[0].data(); }},
     {"reaction", "N", On::supports, 3, From::actions, [](const Snapshot &s) { return s.actions.reaction[0].data(); }},
+    {"reaction_moment", "N m", On::supports, 3, From::actions, [](const Snapshot &s) { return s.actions.reaction_moment[0].data(); }},
 };
 
 std::vector<std::string> namesOf(bool derived) {
@@ -120,12 +121,14 @@ const std::vector<std::string> &Diagnostics::names() {
                                               "wall_seconds",
                                               "error_estimate",
                                               "rejected_iterations",
-                                              "rounding_error"};
+                                              "rounding_error",
+                                              "work_loads",
+                                              "work_supports"};
   return names;
 }
 
 const std::vector<std::string> &Diagnostics::units() {
-  static const std::vector<std::string> units{"s", "s", "J", "J", "J", "J", "J", "J", "1", "1", "1", "1", "s", "1", "1", "1"};
+  static const std::vector<std::string> units{"s", "s", "J", "J", "J", "J", "J", "J", "1", "1", "1", "1", "s", "1", "1", "1", "J", "J"};
   return units;
 }
 
@@ -145,7 +148,9 @@ std::vector<double> Diagnostics::values() const {
           wall_seconds,
           error_estimate,
           double(rejected_iterations),
-          rounding_error};
+          rounding_error,
+          work.loads,
+          work.supports};
 }
 
 TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene, const Elements &elements, const Provenance &provenance,
@@ -170,6 +175,8 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
     file_.writeAttribute(std::string("state/") + f.name, "unit", std::string(f.unit));
     file_.writeAttribute(std::string("state/") + f.name, "place", std::string(places[std::size_t(f.place)]));
   }
+  file_.createGroup("summary");
+  writeSummary(emptySummary(scene));
   file_.createGroup("diagnostics");
   for (std::size_t k = 0; k < Diagnostics::names().size(); ++k) {
     const std::string path = "diagnostics/" + Diagnostics::names()[k];

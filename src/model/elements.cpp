@@ -180,6 +180,16 @@ std::vector<LooseCell> cellsOf(const Elements &elements, int rod) {
   return cells;
 }
 
+std::vector<LooseCell> heldCells(const Elements &elements, int r, int frame) {
+  const RodRange &rod = elements.rods[r];
+  if (frame == rod.slot(-1)) return {{frame + 1, frame, frame + 1, frame + 1}};
+  if (frame == rod.slot(rod.edges)) return {{frame, frame - 1, frame, frame}};
+  std::vector<LooseCell> cells;
+  for (const LooseCell &cell : elements.loose[r])
+    if (cell.frame0 == frame || cell.frame1 == frame) cells.push_back(cell);
+  return cells;
+}
+
 int edgeAt(const RodRange &rod, int slot) {
   const int i = slot - rod.first_slot;
   if (i >= 0 && i < rod.edges) return i;

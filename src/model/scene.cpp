@@ -42,6 +42,19 @@ Mat3 Motion::rotationAt(double time) const {
   return Eigen::AngleAxisd(angle, r / angle).toRotationMatrix();
 }
 
+Vec3 Motion::turnBetween(double from, double to) const {
+  const int parts = 1 + int(2 * (rotationVectorAt(to) - rotationVectorAt(from)).norm());
+  Vec3 sum = Vec3::Zero();
+  Mat3 before = rotationAt(from);
+  for (int k = 1; k <= parts; ++k) {
+    const Mat3 now = rotationAt(k == parts ? to : from + (to - from) * k / parts);
+    const Eigen::AngleAxisd turn(Mat3(now * before.transpose()));
+    sum += turn.angle() * turn.axis();
+    before = now;
+  }
+  return sum;
+}
+
 bool Scene::stiffnessDissipates() const {
   return std::any_of(rods.begin(), rods.end(), [](const Rod &rod) { return rod.material.stiffness_damping_coefficient != 0; });
 }

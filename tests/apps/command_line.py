@@ -138,6 +138,33 @@ def warns(folder):
         assert "default material: " in f.read()
 
 
-for test in (commands, redraws, joins, warns):
+def summarises(folder):
+    """The block at the end and /summary: a cantilever under a force at its tip, small enough for F L, beside one that has no load."""
+    told, x, _ = run(folder, LINE.replace("simulation", "gravity: [0, 0, 0]\nsimulation"))
+    block = told.split("at the end, largest values and where:\n")[1].splitlines()
+    assert len(block) < 10 and block[0].split()[:3] == ["displacement", block[0].split()[1], "m"], told
+    assert block[0].endswith("vertex 8 of rod 'a'") and [line.split()[0] for line in block[:2]] == ["displacement", "tension"], told
+    with open(f"{folder}/out/log.txt") as f:
+        assert "\n".join(block[:5]) in f.read()
+    with h5py.File(f"{folder}/out/trajectory.h5") as f:
+        s = dict(f["summary"].attrs)
+    mass = 2 * np.pi * 1e-4 * 1000
+    assert abs(s["mass"] / mass - 1) < 1e-12 and s["time"] == 1
+    assert s["largest_displacement_rod"] == 0 and s["largest_displacement_vertex"] == 8 and s["largest_angle_rod"] == 0
+    assert abs(s["largest_displacement"] - np.linalg.norm(x[8] - [1, 0, 0])) < 1e-15
+    assert np.allclose(s["centre_of_mass"], [0.5, 0.5, s["centre_of_mass"][2]], 1e-6)
+    force, moment = s["reaction"].reshape(-1, 3), s["reaction_moment"].reshape(-1, 3)
+    assert np.allclose(force, [[0, 0, -1e-3], [0, 0, 0]], rtol=0, atol=1e-8)  # -snes_rtol of the load
+    assert np.allclose(moment, [[0, 5e-4, 0], [0, 0, 0]], rtol=0, atol=1e-7)  # F L/2, and -F times what the arm loses
+    assert np.allclose(s["total_reaction"], force.sum(axis=0)) and np.allclose(s["total_reaction_moment"], moment.sum(axis=0), atol=1e-12)
+    # A rod that nothing holds and nothing bends.
+    told, _, _ = run(folder, LINE.split("supports")[0].replace("static", "dynamic, dt: 0.1, t_end: 0.2"))
+    assert "reactions" not in told and "  displacement" in told, told
+    with h5py.File(f"{folder}/out/trajectory.h5") as f:
+        s = dict(f["summary"].attrs)
+    assert s["largest_tension"] < 1e-12 and s["largest_angle_rod"] == -1 and "reaction" not in s, s  # rounding of 9.81 N
+
+
+for test in (commands, redraws, joins, warns, summarises):
     with tempfile.TemporaryDirectory() as place:
         test(place)

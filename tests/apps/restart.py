@@ -5,6 +5,7 @@ import glob
 import os
 import random
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -136,6 +137,12 @@ def changes(tmp):
     for name in w.dtype.names:
         if name != "wall_seconds":
             assert np.array_equal(w[name][-len(o):], o[name]), name + " of the diagnostics differs"
+    shutil.copy(tmp + "/half/checkpoint.h5", tmp + "/format_2.h5")
+    with h5py.File(tmp + "/format_2.h5", "r+") as f:  # as format 2 was, which knew no actions of supports
+        del f["support_actions"], f.attrs["remembered_actions"], f.attrs["checksum"]
+        f.attrs["format_version"] = 2.0
+    run(0, *one, "-t_end", 0.5, "-output_dir", tmp + "/old", "-restart", tmp + "/format_2.h5", says="has no checksum")
+    same(final(tmp + "/whole"), final(tmp + "/old"))
     run(0, *one, "-t_end", 0.3, "-dt", 0.01, "-output_dir", tmp + "/dt", *start, says="changed since the checkpoint: dt: 0.005 -> 0.01")
     assert np.allclose(rows(tmp + "/dt")["dt"], 0.01, rtol=1e-9)
     write(tmp + "/slow.yaml", open(tmp + "/rod.yaml").read().replace("dt: 0.005", "dt: 0.025"))
@@ -169,6 +176,24 @@ def changes(tmp):
     run(0, *one, "-t_end", 0.5, "-output_dir", tmp + "/from_old", "-restart", tmp + "/old.h5", says="is of an earlier version")
     same(final(tmp + "/whole"), final(tmp + "/from_old"))
     print("changes told")
+
+
+def balances(tmp):
+    """A clamp that turns and travels, and a load: work and dissipation have the same bits, by methods that remember what supports did."""
+    driven = let_go.replace("type: clamp}", "type: clamp, motion: {velocity: [0.1, 0, 0], angular_velocity: [2, 0, 0.5]}}")
+    scene = ["-scene", write(tmp + "/driven.yaml", driven + "loads:\n- {vertex: last, force: [0, 0.3, 0]}\n"), "-output_interval", 0.05]
+    for method in ("bdf2", "bdf3", "generalized_alpha"):
+        one = [*scene, "-integrator", method]
+        run(0, *one, "-t_end", 0.2, "-output_dir", tmp + "/whole")
+        run(0, *one, "-t_end", 0.1, "-output_dir", tmp + "/half")
+        run(0, *one, "-t_end", 0.2, "-output_dir", tmp + "/on", "-restart", tmp + "/half/checkpoint.h5")
+        w, o = rows(tmp + "/whole"), rows(tmp + "/on")
+        assert len(o) == 20 and min(abs(o["work_loads"])) > 0 and min(abs(o["work_supports"])) > 0
+        for name in w.dtype.names:
+            assert name == "wall_seconds" or np.array_equal(w[name][-len(o):], o[name]), method + ": " + name
+        energy = sum(w[name] for name in ("kinetic", "stretch", "bend", "twist", "gravity"))
+        off = np.diff(energy) - (w["work_loads"] + w["work_supports"] - w["dissipated"])[1:]
+        assert abs(off).max() < 1e-12 * energy.max(), method  # rounding of the sums
 
 
 def folders(tmp):
@@ -315,7 +340,7 @@ def full(tmp):
     print("full disks are told,", with_frames, "with frames")
 
 
-for test in (letGo, changes, folders, automatic, signals, full):
+for test in (letGo, changes, balances, folders, automatic, signals, full):
     if len(sys.argv) > 3 and test.__name__ not in sys.argv[3:]:
         continue
     with tempfile.TemporaryDirectory() as folder:

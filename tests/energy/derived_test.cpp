@@ -232,6 +232,71 @@ TEST(Reaction, OfAllSupportsIsTheLoad) {
   EXPECT_LT((reaction[0] + reaction[2] + Vec3(0, -3 - 0.5, 2.5)).norm(), 10 * exact);
 }
 
+/// Force and moment of the whole rod: what supports do, loads on held vertices, weights and couples sum to nothing, about the origin too.
+TEST(ReactionMoment, BalancesTheWholeRod) {
+  const int edges = 12;
+  for (const Measure measure : {Measure::tan, Measure::angle})
+    for (const Energy energy : {Energy::seed, Energy::classical})
+      for (const bool couples : {false, true}) {
+        Scene scene = clampedScene(softRod(edges, measure));
+        scene.rods[0].energy = energy;
+        scene.supports.push_back(hold(scene, 0, 4, Support::Kind::fix_twist));
+        scene.supports.push_back(hold(scene, 0, 7, Support::Kind::clamp));
+        scene.supports.push_back(hold(scene, 0, edges, Support::Kind::pin));
+        scene.supports.push_back(hold(scene, 0, edges, Support::Kind::fix_twist));
+        scene.supports[0].motion.angular_velocity = Vec3(0.3, 0.2, -0.4);
+        scene.supports[1].motion.angular_velocity = Vec3(0.5, 0, 0);
+        scene.supports[2].motion.velocity = Vec3(0.02, 0.1, 0.05);
+        scene.forces = {{0, 3, Vec3(0, -1, 0.5)}, {0, 7, Vec3(0, 0, 2)}, {0, 10, Vec3(0, 0.5, 0)}};
+        scene.gravity = Vec3(0, -3, 1);
+        if (couples) scene.moments = {{0, 2, 0.3, Vec3(0.1, 0.2, 0)}, {0, 9, 0, Vec3(0, -0.2, 0.3)}};
+        Simulation sim;
+        solve(sim, scene, 4, couples ? "1e-8" : "1e-10");
+        const RodActions actions = actionsOf(sim);
+        Vec3 force = Vec3::Zero(), moment = Vec3::Zero();
+        auto add = [&](int v, const Vec3 &f) {
+          force += f;
+          moment += sim.state.position[v].cross(f);
+        };
+        for (int v = 0; v <= edges; ++v) add(v, sim.elements->mass()[sim.elements->vertex_slot[v]] * scene.gravity);
+        for (const NodalForce &f : scene.forces) add(f.vertex, f.force);
+        for (std::size_t s = 0; s < scene.supports.size(); ++s) {
+          add(scene.supports[s].vertex, actions.reaction[s]);
+          moment += actions.reaction_moment[s];
+        }
+        for (const EdgeMoment &m : scene.moments) moment += m.moment + m.torque * (sim.state.position[m.edge + 1] - sim.state.position[m.edge]).normalized();
+        const double tolerance = couples ? 1e-5 : 10 * exact; // with couples Newton converges linearly; loads of 8
+        EXPECT_LT(force.norm(), tolerance);
+        EXPECT_LT(moment.norm(), tolerance);
+        EXPECT_EQ(actions.reaction_moment[3], Vec3(Vec3::Zero()));
+        for (const int s : {0, 1, 2, 4}) EXPECT_GT(actions.reaction_moment[s].norm(), 1e-2) << s;
+      }
+}
+
+/// Beams of small deflections: F L; 11/16 P, 5/16 P and 3/16 P L of a propped cantilever under P in the middle.
+TEST(ReactionMoment, OfBeamsIsThatOfTheory) {
+  const double load = 1e-5;
+  const int edges = 64;
+  Rod rod = straightRod(edges, Measure::angle);
+  rod.material.axial_stiffness = 1e4; // tension from deflections of 1e-7 is none
+  Scene scene = clampedScene(rod);
+  scene.forces = {{0, edges, Vec3(0, -load, 0)}};
+  Simulation cantilever;
+  solve(cantilever, scene, 1);
+  EXPECT_LT((actionsOf(cantilever).reaction_moment[0] - Vec3(0, 0, load)).norm(), 1e-8 * load);
+  EXPECT_LT((actionsOf(cantilever).reaction[0] - Vec3(0, load, 0)).norm(), 1e-8 * load);
+  scene.supports.push_back(hold(scene, 0, edges, Support::Kind::pin));
+  scene.forces = {{0, edges / 2, Vec3(0, -load, 0)}};
+  Simulation propped;
+  solve(propped, scene, 1);
+  const RodActions actions = actionsOf(propped);
+  const double cut = 2e-4 * load; // of 64 edges, 1/64^2 = 2.4e-4
+  EXPECT_LT((actions.reaction[0] - Vec3(0, 11.0 / 16 * load, 0)).norm(), cut);
+  EXPECT_LT((actions.reaction[1] - Vec3(0, 5.0 / 16 * load, 0)).norm(), cut);
+  EXPECT_LT((actions.reaction_moment[0] - Vec3(0, 0, 3.0 / 16 * load)).norm(), cut);
+  EXPECT_EQ(actions.reaction_moment[1], Vec3(Vec3::Zero()));
+}
+
 /// In motion: the change of momentum of all vertices, dissipation by mass included, over one step of backward Euler.
 TEST(Reaction, OfAMovingPinPullsTheRodAlong) {
   const double dt = 0.01;

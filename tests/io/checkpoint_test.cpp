@@ -72,6 +72,7 @@ Scene turnedScene(int edges = 8) {
   scene.supports = {hold(scene, 0, 0, Support::Kind::clamp), hold(scene, 0, edges, Support::Kind::clamp), hold(scene, 1, 5, Support::Kind::pin)};
   scene.supports[0].motion.velocity = Vec3(0.1, 0, 0.2);
   scene.supports[1].motion.angular_velocity = Vec3(240, 0, 0);
+  scene.forces = {{0, edges - 3, Vec3(0, 1, 0)}};
   return scene;
 }
 
@@ -329,11 +330,11 @@ TEST(Checkpoint, RunsGoOnToTheSameBits) {
       settings.output_interval = 0.02;
       settings.estimate_error = true;
       const std::string path = folder.path(name + ".h5");
-      std::map<std::int64_t, std::vector<double>> dissipated; // by step, of both runs
+      std::map<std::int64_t, std::vector<double>> balance; // by step, of both runs
       auto run = [&](Simulation &sim, TimeLoop &loop, bool writes) {
         bool finished = false;
         const auto observe = [&](const State &state, const Diagnostics &row) {
-          dissipated[state.step].push_back(row.dissipated);
+          for (const double value : {row.dissipated, row.work.supports, row.work.loads}) balance[state.step].push_back(value);
           if (writes && state.time > 0.07) {
             writeCheckpoint(path, sim, loop.control, RunFacts(sim.scene, settings));
             writes = false;
@@ -362,10 +363,12 @@ TEST(Checkpoint, RunsGoOnToTheSameBits) {
       EXPECT_TRUE(second.state == whole.state);
       EXPECT_EQ(numbersOf(second_loop.control), numbersOf(whole_loop.control));
       int both = 0;
-      for (const auto &[step, values] : dissipated)
-        if (values.size() == 2) {
+      for (const auto &[step, values] : balance)
+        if (values.size() == 6) {
           ++both;
-          EXPECT_EQ(values[0], values[1]) << "dissipated by step " << step;
+          EXPECT_NE(values[1], 0);
+          EXPECT_NE(values[2], 0);
+          for (int k = 0; k < 3; ++k) EXPECT_EQ(values[k], values[k + 3]) << "balance " << k << " of step " << step;
         }
       EXPECT_GT(both, 3);
     }

@@ -107,6 +107,7 @@ def every_field_with_its_unit(folder):
     assert t.unit("half_axes") == "m" and t.unit("flexural_stiffness") == "N m^2" and t.unit("load_factor") == "1"
     assert np.array_equal(t.time, [0, 0.125, 0.25, 0.375, 0.5]) and t.step.tolist() == [0, 1, 2, 3, 4]
     assert len(t.critical) == 0 and t.estimate is None and t.bodies == t.colliders == t.supports == []
+    assert t.summary["time"] == 0.5 and t.summary["largest_displacement"] > 1 and t.summary["centre_of_mass"].shape == (3,)
 
 
 def rods_and_origin(folder):

@@ -104,6 +104,8 @@ public:
 
   /// Displacements of the iterate since the step began, and the rates that follow from them by a rule.
   StageRates stageRates(const StageRule &rule) const;
+  /// Force [N] and moment [N m] of a support on its rod at the iterate, without the inertia of the held vertex itself. \param start of the step
+  std::array<Vec3, 2> supportAction(const State &start, int support);
   const Configuration &start() const { return start_; }
   double length(int rod) const { return length_[rod]; }         ///< at rest [m]
   double shortestEdge(int rod) const { return shortest_[rod]; } ///< at rest [m]

@@ -28,6 +28,14 @@ public:
   virtual bool leavesChords() const { return false; }
   /// How many sets of State::strains are wanted, where stiffness dissipates.
   virtual int remembersStrains() const { return 0; }
+  /// How many sets of State::support_actions are wanted.
+  virtual int remembersActions() const { return 0; }
+  /// Weights of the forces at the stages, then at the end of the last step and of the one before, in their mean over a step of length h [s].
+  virtual std::vector<double> forceWeights(const State & /*start*/, double /*h*/, std::size_t stages) const {
+    std::vector<double> last(stages, 0.0);
+    last.back() = 1;
+    return last;
+  }
   /// Fills the memory of a state that has none; most methods begin without.
   virtual PetscErrorCode begin(StepSolver & /*solver*/, double /*h*/, State & /*state*/) const { return PetscErrorCode(0); }
   /// Local error of the displacements of a step, to leading order; empty where nothing is known yet.

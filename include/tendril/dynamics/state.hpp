@@ -30,6 +30,8 @@ struct State {
   double dt_before = 0;            ///< of the step before that; 0 where there was none [s]
   std::vector<Rates> memory;       ///< what the integrator remembers of steps before
   std::vector<double> strains;     ///< before the last step, as strainsOf, then before the one before; where the integrator wants them
+  /// What supports that move did at the end of the last step, then of the one before (SupportActions); where the integrator wants them.
+  std::vector<Vec3> support_actions;
 
   bool operator==(const State &) const = default;
 };

@@ -4,6 +4,7 @@
 
 #include "tendril/dynamics/bifurcation.hpp"
 #include "tendril/dynamics/integrator.hpp"
+#include "tendril/energy/work.hpp"
 #include "tendril/io/trajectory.hpp"
 #include "tendril/solver/step_solver.hpp"
 
@@ -72,9 +73,11 @@ private:
   LoopSettings settings_;
   std::string failure_;
   std::unique_ptr<Integrator> integrator_;
-  Integrator::Stages stages_;  ///< of the step under way
-  double located_ = -1;        ///< last critical load factor
-  std::optional<Planes> mode_; ///< critical mode along which the next step begins
+  Integrator::Stages stages_;           ///< of the step under way
+  double located_ = -1;                 ///< last critical load factor
+  std::optional<Planes> mode_;          ///< critical mode along which the next step begins
+  std::vector<int> moving_;             ///< supports
+  std::vector<SupportActions> actions_; ///< of those, at each stage of the step under way
 
   /// Error of the step under way, and what it moved: the largest of any rod, root mean square over its length [turns in rad].
   struct StepError {
@@ -83,6 +86,9 @@ private:
   };
   PetscErrorCode solveStages(const State &start, const Step &step, NewtonReport *report);
   StepError stepError(const State &start, double h) const;
+  void noteActions(const State &start, RodSet rods);
+  Work dynamicWork(const State &start, double h) const;
+  double movedKinetic(const State &state) const;
   void finishStages(State &state, double h);
   double nextStep(double time, double *landing) const;
   bool adapt(double h, double dt_min, const StepError &error);

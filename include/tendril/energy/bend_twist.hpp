@@ -283,4 +283,12 @@ template <Measure measure, class T, class Out> void cellDerivatives(const FrameO
   for (int r = 0; r < 3; ++r) out.putGradient(8 + r, gradient[4 + r]);
 }
 
+/// Derivative of a cell's energy by turning its second frame against its first, about axes fixed in space [N m]: that by turning the one that is free, as
+/// turning both costs nothing.
+/// \param d gradient of the cell
+inline Vec3 cellMoment(const Frame &f0, const Frame &f1, const CellOf<double> &cell, const std::array<double, cell_size> &d) {
+  if (cell.free[1] != 0) return f1.length * f1.tangent.cross(Eigen::Map<const Vec3>(&d[8])) + d[7] * f1.tangent;
+  return f0.length * f0.tangent.cross(Eigen::Map<const Vec3>(&d[0])) - d[3] * f0.tangent;
+}
+
 } // namespace tendril

@@ -24,6 +24,8 @@ struct RodActions {
   /// (ns) What each support does to its rod; zero where it holds no position [N]. With the weight and the loads on its vertex and dissipation by mass;
   /// prescribed motions have no acceleration but at their kinks.
   std::vector<Vec3> reaction;
+  /// (ns) The moment that goes with it, about its vertex: of clamps and of `fix_twist`; zero for pins [N m].
+  std::vector<Vec3> reaction_moment;
 };
 /// With forces F and couples C, at an equilibrium and whatever the edge length: force(i) = force(i+1) + F(i+1) and
 /// moment(i) = moment(i+1) + e(i) x force(i) + C(i).

@@ -54,7 +54,12 @@ public:
   virtual double energy(const Configuration &configuration, int rod) const = 0;
   /// Adds gradient and Hessian, pulled back by the retraction at the configuration.
   virtual void addDerivatives(const Configuration &configuration, int rod, Derivatives &out, HessianKind hessian = HessianKind::exact) const = 0;
+  /// Derivative of the energy by turning the frame of a support, at its slot, about axes fixed in space [N m].
+  virtual Vec3 momentOn(const Configuration & /*configuration*/, int /*rod*/, int /*frame*/) const { return Vec3::Zero(); }
 };
+
+/// The same of the half cells beside a frame. \param cells their constants, as Elements::cells()
+Vec3 momentOn(const Elements &elements, const Planes &cells, const Configuration &configuration, int rod, int frame);
 
 /// Strain around which dissipation by stiffness pulls: that at the start, with what the stage remembers.
 template <class T> T dampedRest(const Step &step, const T &start, std::size_t index) {

@@ -6,11 +6,12 @@
 
 namespace tendril {
 
-/// Where measure `tan` went furthest from the angle itself, turning or twist at a vertex. Cables and rods of measure `angle` do not count.
+/// The largest turning or twist between neighbouring edges. Cables do not count; rods of measure `angle`, for which it is no error, only when asked for.
 struct WidestAngle {
   double angle;             ///< [rad]
   int rod = -1, vertex = 0; ///< rod -1: nothing was wider than the angle that it began with
   double time = 0;
+  bool every_measure = false;
   void include(const Scene &scene, const Elements &elements, const State &state);
 };
 

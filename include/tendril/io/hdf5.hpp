@@ -81,6 +81,7 @@ public:
   void writeAttribute(const std::string &object, const std::string &name, const std::string &value);
   void writeAttribute(const std::string &object, const std::string &name, double value);
   void writeAttribute(const std::string &object, const std::string &name, int value);
+  void writeAttribute(const std::string &object, const std::string &name, const std::vector<double> &values);
   hid_t id() const { return file_; }
 
 private:

@@ -2,9 +2,10 @@
 /// \file trajectory.hpp
 /// Trajectories: one HDF5 file that grows frame by frame (layout in docs/reading_results.md) and the XDMF file by which ParaView reads it.
 
-#include "tendril/energy/term.hpp"
+#include "tendril/energy/work.hpp"
 #include "tendril/io/hdf5.hpp"
 #include "tendril/io/scene_reader.hpp"
+#include "tendril/io/summary.hpp"
 
 #include <chrono>
 #include <fstream>
@@ -18,7 +19,8 @@ namespace tendril {
 struct Diagnostics {
   double time = 0, dt = 0;
   EnergyBudget energy;
-  double dissipated = 0; ///< by the step, of kinetic and potential energy: what the loads and supports put in is counted too [J]
+  Work work;             ///< of loads and supports in the step [J]
+  double dissipated = 0; ///< by the step: the fall of the energies, and the work [J]
   int newton_iterations = 0, line_search_trials = 0, negative_pivots = 0, rejected_steps = 0;
   double wall_seconds = 0;
   double rounding_error = 0;   ///< what rounding keeps from the answer, over rod lengths; in dynamics summed over the steps (NewtonReport)
@@ -52,6 +54,8 @@ public:
   void writeDiagnostics(const Diagnostics &row);
   /// Adds to /critical/load_factor.
   void writeCritical(double load_factor);
+  /// Of the last state.
+  void writeSummary(const Summary &summary) { tendril::writeSummary(file_, summary); }
   /// Makes all that was written safe from a kill, and visible to readers. \throws SceneError when it cannot be written
   void flush();
   void flushWhenDue();

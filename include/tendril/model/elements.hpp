@@ -64,6 +64,8 @@ private:
 
 /// Cells of a rod one by one in scene order, those of half edges too.
 std::vector<LooseCell> cellsOf(const Elements &elements, int rod);
+/// Half cells between the frame of a support, at its slot, and the edges beside it.
+std::vector<LooseCell> heldCells(const Elements &elements, int rod, int frame);
 /// Edge of a rod at the slot of a frame, or -1 where a support's is.
 int edgeAt(const RodRange &rod, int slot);
 

@@ -61,6 +61,8 @@ struct Motion {
   Vec3 velocityAt(double time) const;       ///< where it jumps, that before [m/s]
   Vec3 rotationVectorAt(double time) const; ///< [rad]
   Mat3 rotationAt(double time) const;
+  /// Sum of the rotation vectors of its parts between two times, each of less than half a radian: whole turns are counted [rad].
+  Vec3 turnBetween(double from, double to) const;
 };
 
 /// What holds a vertex. `clamp` holds its position, tangent and director by half cells to a fixed frame; `pin` its position;

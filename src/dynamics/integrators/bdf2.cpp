@@ -12,6 +12,10 @@ public:
 
   int stages(const State &start) const override { return start.memory.empty() ? first_->stages(start) : 1; }
   int remembersStrains() const override { return 1; }
+  int remembersActions() const override { return 1; }
+  std::vector<double> forceWeights(const State &start, double h, std::size_t stages) const override {
+    return start.memory.empty() ? first_->forceWeights(start, h, stages) : std::vector<double>{0.5, 0.5};
+  }
 
   StageRule stage(const State &start, double h, const Stages &done) const override {
     if (start.memory.empty()) return first_->stage(start, h, done);

@@ -16,6 +16,14 @@ public:
   int order() const override { return 3; }
   int stages(const State &start) const override { return begins(start) ? first_->stages(start) : 1; }
   int remembersStrains() const override { return 2; }
+  int remembersActions() const override { return 2; }
+  /// The mean over the step of the parabola through three ends of steps.
+  std::vector<double> forceWeights(const State &start, double h, std::size_t stages) const override {
+    if (begins(start)) return first_->forceWeights(start, h, stages);
+    const Weights w(start, h);
+    const double now = h / (6 * w.H1), before = now * h / w.h1;
+    return {0.5 - now, 0.5 + now + before, -before};
+  }
   PetscErrorCode begin(StepSolver &solver, double h, State &state) const override { return first_->begin(solver, h, state); }
 
   StageRule stage(const State &start, double h, const Stages &done) const override {

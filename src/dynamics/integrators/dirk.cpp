@@ -32,6 +32,7 @@ public:
   int order() const override { return order_; }
   int stages(const State &) const override { return stages_; }
   bool endsAtStage() const override { return stiffly_accurate_; }
+  std::vector<double> forceWeights(const State &, double, std::size_t) const override { return {b_.begin(), b_.end()}; }
 
   /// Guesses of third order need the acceleration of the start.
   PetscErrorCode begin(StepSolver &solver, double h, State &state) const override {

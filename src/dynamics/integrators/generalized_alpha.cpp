@@ -15,6 +15,8 @@ public:
         b_(0.25 * (1 - am_ + af_) * (1 - am_ + af_)) {}
 
   int remembersStrains() const override { return 1; }
+  int remembersActions() const override { return 1; }
+  std::vector<double> forceWeights(const State &, double, std::size_t) const override { return {0.5, 0.5}; }
 
   PetscErrorCode begin(StepSolver &solver, double h, State &state) const override {
     PetscFunctionBeginUser;

@@ -1,0 +1,91 @@
+#include "tendril/energy/work.hpp"
+
+#include "tendril/energy/derived.hpp"
+
+namespace tendril {
+namespace {
+
+/// Potential of the weight and of centrifugal forces at load factor 1 [J].
+double weightPotential(const Scene &scene, const Elements &elements, const Configuration &c) {
+  const Mat3 spin = scene.rotation.matrix();
+  double sum = 0;
+  for (std::size_t r = 0; r < scene.rods.size(); ++r) {
+    const RodRange &rod = elements.rods[r];
+    const Vec3 gravity = scene.rods[r].gravity ? scene.gravity : Vec3(Vec3::Zero());
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) {
+      const Vec3 x = c.positionAt(s), away = x - scene.rotation.centre;
+      sum -= elements.mass()[s] * (gravity.dot(x) + 0.5 * away.dot(spin * away));
+    }
+  }
+  return sum;
+}
+
+SupportActions staticActions(const Scene &scene, const Elements &elements, const State &state, const std::vector<int> &moving) {
+  const RodActions actions = rodActions(scene, elements, state, state.time, state.time);
+  SupportActions out;
+  for (const int s : moving) out.insert(out.end(), {actions.reaction[s], actions.reaction_moment[s]});
+  return out;
+}
+
+} // namespace
+
+double coupleWork(const Vec3 &moment, double torque, const Vec3 &from, const Vec3 &to, double spin) {
+  const Vec3 axis = from.cross(to);
+  const double sine = axis.norm(), turning = sine > 0 ? std::atan2(sine, from.dot(to)) / sine : 1;
+  const Vec3 mean = (from + to).normalized();
+  return (torque + moment.dot(mean)) * spin + turning * moment.dot(axis);
+}
+
+double workOfLoads(const Scene &scene, const Elements &elements, const Configuration &start, const Configuration &end, double factor_start, double factor_end) {
+  const double mean = 0.5 * (factor_start + factor_end);
+  double sum = 0;
+  for (const NodalForce &f : scene.forces) sum += mean * f.force.dot(end.displacementAt(elements.rods[f.rod].slot(f.vertex), start));
+  for (const EdgeMoment &m : scene.moments) {
+    const int slot = elements.rods[m.rod].slot(m.edge);
+    const Frame before = start.frameAt(slot), after = end.frameAt(slot);
+    const double principal = halfAngleBetween(before, after).angle(), spun = end[Configuration::spin][slot] - start[Configuration::spin][slot];
+    sum += mean * coupleWork(m.moment, m.torque, before.tangent, after.tangent, principal + 2 * pi * std::round((spun - principal) / (2 * pi)));
+  }
+  if (!scene.moments.empty()) // an end couple turns the half edge beyond the last cell, too, and what it does there is stored
+    for (const auto &couples : elements.end_couples)
+      for (const EndCouple &couple : couples)
+        for (int k = 0; k < 3; ++k) sum += endEnergy(elements, end, couple, factor_end)[k] - endEnergy(elements, start, couple, factor_start)[k];
+  if (factor_end != factor_start) sum += 0.5 * (factor_end - factor_start) * (weightPotential(scene, elements, start) + weightPotential(scene, elements, end));
+  return sum;
+}
+
+std::vector<int> movingSupports(const Scene &scene) {
+  std::vector<int> moving;
+  for (std::size_t s = 0; s < scene.supports.size(); ++s)
+    if (scene.supports[s].motion.moves()) moving.push_back(int(s));
+  return moving;
+}
+
+double workOfSupports(const Scene &scene, const Elements &elements, const Configuration &start, const Configuration &end, double from, double to,
+                      const SupportActions &actions) {
+  double sum = 0;
+  std::size_t next = 0;
+  for (const int s : movingSupports(scene)) {
+    const Support &support = scene.supports[s];
+    const Vec3 &force = actions[next++], &moment = actions[next++];
+    sum += force.dot(end.displacementAt(elements.rods[support.rod].slot(support.vertex), start)) + moment.dot(support.motion.turnBetween(from, to));
+  }
+  return sum;
+}
+
+Work staticWork(const Scene &scene, const Elements &elements, const State &before, const State &after, const Configuration &start, const Configuration &end) {
+  Work work{workOfLoads(scene, elements, start, end, before.time, after.time), 0};
+  const std::vector<int> moving = movingSupports(scene);
+  if (moving.empty()) return work;
+  SupportActions mean = staticActions(scene, elements, before, moving);
+  const SupportActions last = staticActions(scene, elements, after, moving);
+  for (std::size_t k = 0; k < mean.size(); ++k) mean[k] = 0.5 * (mean[k] + last[k]);
+  work.supports = workOfSupports(scene, elements, start, end, before.time, after.time, mean);
+  return work;
+}
+
+Work staticWork(const Scene &scene, const Elements &elements, const State &before, const State &after) {
+  return staticWork(scene, elements, before, after, configurationOf(before, scene, elements, before.time), configurationOf(after, scene, elements, after.time));
+}
+
+} // namespace tendril
