@@ -20,6 +20,7 @@ import numpy as np
 
 FORMATS = (1, 2)
 PLACES = ("vertices", "edges", "cells")
+ON_DEMAND = ("curvature", "twist", "strain_energy_density", "force", "moment", "reaction", "position_low")
 
 # Place and unit of what is in files of format 1; later ones tell by themselves.
 FORMAT_1_FIELDS = {
@@ -454,7 +455,8 @@ class Trajectory:
     def field(self, name):
         """The Field of this name."""
         if name not in self._fields:
-            raise TendrilError(f"there is no field '{name}'; there are: {_listed(self._fields)}")
+            hint = f"; runs with -output_fields all,{name} have it" if name in ON_DEMAND else ""
+            raise TendrilError(f"there is no field '{name}'; there are: {_listed(self._fields)}{hint}")
         return Field(self, name)
 
     def at(self, time):

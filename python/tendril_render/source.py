@@ -1,6 +1,6 @@
 """From a trajectory to shapes: which frames, which values, which colours."""
 import numpy as np
-from tendril import Trajectory
+from tendril import ON_DEMAND, Trajectory
 
 from .shapes import RECTANGLE, bar, body, ellipse, join, smoothed, tube
 
@@ -89,7 +89,8 @@ class Source:
     def __init__(self, t, field, frames, theme, colours, radius=None, smooth=False, offset=(0, 0, 0),
                  rods=slice(None)):
         if field is not None and field not in fields(t):
-            raise Mistake(f"field {field}: this trajectory has {', '.join(fields(t))}")
+            hint = f"; runs with -output_fields all,{field} have it" if field in ON_DEMAND else ""
+            raise Mistake(f"field {field}: this trajectory has {', '.join(fields(t))}{hint}")
         self.t, self.field, self.theme, self.radius, self.smooth = t, field, theme, radius, smooth
         self.rods = range(len(t.rods))[rods]
         if not self.rods:

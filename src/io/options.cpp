@@ -288,7 +288,8 @@ PetscErrorCode refuseUnknownOptions() {
   for (const Key &key : keys)
     if (key.isOption()) known.emplace_back(key.name());
   for (const Key *key : rodOverrides()) known.push_back("rod_" + std::string(key->name()));
-  const std::string near = closest(unknown, known);
+  const bool of_rod = std::find(known.begin(), known.end(), "rod_" + unknown) != known.end(); // a key of the scene, as in -young
+  const std::string near = of_rod ? "rod_" + unknown : closest(unknown, known);
   fail(unknown, "unknown or unused" + (near.empty() ? "" : "; did you mean -" + near + "?") + " (-help lists all options)");
 }
 

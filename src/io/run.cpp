@@ -223,7 +223,7 @@ bool takeUp(const Options &o, const OutputFolder &folder, const RunFacts &facts,
     }
     if (from.empty()) told->push_back("-restart auto: no checkpoint in " + o.output_dir + ", from the start");
   } else if (!o.restart.empty()) {
-    from = o.restart;
+    from = std::filesystem::is_directory(o.restart) ? (std::filesystem::path(o.restart) / "checkpoint.h5").string() : o.restart;
     changed = readCheckpoint(from, &run, control, facts, told);
     if (isInside(from, o.output_dir))
       throw SceneError("option -restart: the results would replace those beside the checkpoint '" + from +

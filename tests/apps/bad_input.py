@@ -129,6 +129,7 @@ rows = [
     ("missing scene", None, ["-scene", "nowhere.yaml"], ["nowhere.yaml", "cannot be opened"]),
     ("unknown option", None, ["-dtt", "1"], ["-dtt", "unknown"]),
     ("misspelt override", None, ["-rod_yuong", "1e6"], ["-rod_yuong", "did you mean -rod_young"]),
+    ("override without rod_", None, ["-young", "1e6"], ["-young", "did you mean -rod_young"]),
     ("override not a number", None, ["-rod_young", "abc"], ["-rod_young", "'abc'"]),
     ("negative override", None, ["-rod_young", "-1"], ["-rod_young", "greater than zero"]),
     ("zero step", None, ["-dt", "0"], ["-dt", "greater than zero"]),

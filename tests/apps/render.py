@@ -297,6 +297,7 @@ def growing_and_killed(tmp):
 
 def wrong_input(tmp, helix):
     for arguments, words in ((["--field", "nonsense"], "time, rod, axial_force, position"),
+                             (["--field", "moment"], "runs with -output_fields all,moment have it"),
                              (["--times", "5"], "time 5 s is outside the run, 0 to 2 s"),
                              (["--times", "soon"], "soon"), (["--times", "nan"], "nan"),
                              (["--frames", "121"], "the run has 121"), (["--frames", "x"], "--frames"),
@@ -307,6 +308,11 @@ def wrong_input(tmp, helix):
                              (["--radius", "-1"], "--radius"), (["--colour"], "--colour"), (["--animate"], ".webp"),
                              (["--out", f"{tmp}/none/x.png"], "none/x.png"), (["--out", f"{tmp}/x.jpeg"], ".png")):
         render(helix, *arguments, fails=words)
+    for folder, arguments, words in ((helix, ["--times", "5"], "time 5 s is outside the run, 0 to 2 s"),
+                                     (tmp + "/nowhere", [], "nowhere: not a trajectory that can be read")):
+        plotted = subprocess.run([root + "/scripts/plot_trajectory", folder, *arguments, "--out", f"{tmp}/x.png"],
+                                 stderr=subprocess.PIPE, text=True)
+        assert plotted.returncode == 1 and words in plotted.stderr and len(plotted.stderr.splitlines()) == 1, plotted
 
 
 def helix_is_quick_and_the_same(tmp, helix):

@@ -114,7 +114,8 @@ def letGo(tmp):
         moved = np.abs((weight[:, None] * (p[-1] - p[0])).sum(axis=0)).max() / 40
         assert moved < 1e-7 and np.abs(p[-1] - p[0]).max() > 1e-3, moved  # -snes_rtol leaves 1e-6 of forces of 0.03 N
     # Dynamics ends; statics from there finds the equilibrium that statics from the start finds.
-    run(0, "-scene", tmp + "/pull.yaml", "-restart", tmp + "/let_go/checkpoint.h5", "-output_dir", tmp + "/again", says=["the start of statics", "new since the checkpoint: force"])
+    run(0, "-scene", tmp + "/pull.yaml", "-restart", tmp + "/let_go", "-output_dir", tmp + "/again",
+        says=["goes on from " + tmp + "/let_go/checkpoint.h5", "the start of statics", "new since the checkpoint: force"])
     with h5py.File(tmp + "/again/checkpoint.h5") as a, h5py.File(tmp + "/pull/checkpoint.h5") as b:
         assert np.abs(a["position"][:] - b["position"][:]).max() < 1e-6
     # More load on a state of full load.

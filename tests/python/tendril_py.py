@@ -264,6 +264,7 @@ def wrong_input(folder):
     message(lambda: t.rods["sprint"], "'sprint'", "strip, ring, cable")
     message(lambda: t.rods[3], "no rod 3", "there are 3")
     message(lambda: t.field("speed"), "'speed'", "velocity")
+    message(lambda: t.field("reaction"), "'reaction'", "-output_fields all,reaction")
     message(lambda: t.rods[0].field("speed"), "'speed'", "velocity")
     message(lambda: t.rods[0].position(5), "no frame 5", "there are 5")
     message(lambda: t.field("position")[-6], "no frame -6")

@@ -158,7 +158,7 @@ inline constexpr Key keys[] = {
     // Options.
     {"-scene", KeyType::file, "", "required", "scene file (YAML)", anything, "", "data/scenes/helix.yaml", "scene"},
     {"-gravity", KeyType::vector, "m/s^2", "(of the scene)", "acceleration of gravity", anything, "", "0,-9.81,0", "scene"},
-    {"-restart", KeyType::file, "", "(none)", "checkpoint to go on from, to the same bits, or with what has changed; the results go to another folder", anything, "", "", "scene",
+    {"-restart", KeyType::file, "", "(none)", "checkpoint, or its folder, to go on from, to the same bits, or with what has changed; the results go to another folder", anything, "", "", "scene",
      "auto: from the newest whole checkpoint in -output_dir, or from the start where there is none; what is there moves to part_1, part_2 ..."},
     {"-restart_time", KeyType::number, "s", "(of the checkpoint)", "time at which a restarted run begins", not_negative, "", "", "scene", "0 where it goes from statics to dynamics"},
     {"-schema", KeyType::flag, "", "false", "print the scene language as a JSON Schema and stop", anything, "", "", "scene"},
