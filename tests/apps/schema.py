@@ -78,7 +78,7 @@ def mutate(scene, rng):
 READER_ONLY = ("cannot be opened", "must not be zero", "normal to", "not normal", "out of range", "there is no rod", "which 'rod'", "held twice",
                "zero length", "folds back", "too short", "never reaches", "parallel", "must not be empty, a number", "there is a rod", "whole number, or its ends",
                "has no twist", "cannot carry", "no twist to fix", "must increase", "contradicts", "free to move as a whole", "pin holds",
-               "holds no position", "comes out as")
+               "holds no position", "comes out as", "is for -mode static")
 
 
 def reads(scene, folder, name):
