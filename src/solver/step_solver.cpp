@@ -87,41 +87,27 @@ PetscErrorCode StepSolver::solveBlock(NewtonSolver &block, const State &start, N
   PetscFunctionBeginUser;
   const std::vector<RodRange> &rods = potential_->elements().rods;
   const bool fine = std::any_of(rods.begin() + block.rods().begin, rods.begin() + block.rods().end, [](const RodRange &rod) { return rod.edges > fine_edges; });
-  NewtonReport before; // what other tries took
-  auto add = [&](const NewtonReport &other) {
-    before.edge_iterations += other.edge_iterations;
-    before.trials += other.trials;
-    before.shifts += other.shifts;
-    before.escapes += other.escapes;
-    before.first_negative_pivots = std::max(before.first_negative_pivots, other.first_negative_pivots);
-  };
+  NewtonReport failed; // what tries took that led nowhere
   bool solved = false;
-  if (fine && !coarse_first) {
-    PetscCall(block.solve(start, report, Seek::minimum, nullptr, patience));
+  auto attempt = [&](const Guess *guess, int most_iterations) {
+    PetscFunctionBeginUser;
+    PetscCall(block.solve(start, report, Seek::minimum, guess, most_iterations));
     solved = report->converged || report->lost;
-    if (!solved) before.iterations = report->iterations;
-    if (!solved) add(*report);
-  }
+    if (!solved) failed.addWork(*report);
+    PetscFunctionReturn(0);
+  };
+  if (fine && !coarse_first) PetscCall(attempt(nullptr, patience));
   if (fine && !solved) {
     for (int r = block.rods().begin; r < block.rods().end; ++r) potential_->beginRod(start, r);
     Guess guess;
     NewtonReport coarse;
     PetscCall(solveCoarse(*potential_, start, block.rods(), &guess, &coarse));
-    add(coarse);
-    if (coarse.converged) {
-      PetscCall(block.solve(start, report, Seek::minimum, &guess));
-      solved = report->converged || report->lost;
-      if (!solved) before.iterations += report->iterations;
-      if (!solved) add(*report);
-    }
+    coarse.iterations = 0; // iterations are those with all edges
+    failed.addWork(coarse);
+    if (coarse.converged) PetscCall(attempt(&guess, 0));
   }
   if (!solved) PetscCall(block.solve(start, report, Seek::minimum, nullptr));
-  report->iterations += before.iterations;
-  report->edge_iterations += before.edge_iterations;
-  report->trials += before.trials;
-  report->shifts += before.shifts;
-  report->escapes += before.escapes;
-  report->first_negative_pivots = std::max(report->first_negative_pivots, before.first_negative_pivots);
+  report->addWork(failed);
   PetscFunctionReturn(0);
 }
 
@@ -153,6 +139,15 @@ PetscErrorCode StepSolver::softestMode(Planes *mode) {
     PetscCall(block.softestMode(&softest, mode));
   }
   PetscFunctionReturn(0);
+}
+
+void NewtonReport::addWork(const NewtonReport &before) {
+  iterations += before.iterations;
+  edge_iterations += before.edge_iterations;
+  trials += before.trials;
+  shifts += before.shifts;
+  escapes += before.escapes;
+  first_negative_pivots = std::max(first_negative_pivots, before.first_negative_pivots);
 }
 
 void NewtonReport::include(const NewtonReport &block) {

@@ -31,6 +31,8 @@ struct NewtonReport {
   std::string reason;          ///< in words
   /// Adds the report of another block of rods.
   void include(const NewtonReport &block);
+  /// Counts what an earlier try at the same step took.
+  void addWork(const NewtonReport &before);
 };
 
 /// The largest of the residuals, in units of what it should fall to: `rtol` of its scale.
