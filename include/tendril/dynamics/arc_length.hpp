@@ -58,8 +58,8 @@ private:
   PetscErrorCode begin(const State &state, Point *direction);
   PetscErrorCode step(const State &state, double length, bool *converged, const Point *along = nullptr);
   PetscErrorCode locateLimit(const State &start, const Point &before, const std::array<double, 2> &slopes, double length, std::optional<CriticalPoint> *point);
-  PetscErrorCode locateBifurcation(const State &start, const Point &before, double length, std::optional<CriticalPoint> *point);
-  PetscErrorCode switchBranch(const State &critical, double length, double shortest, State *state, bool *switched);
+  PetscErrorCode locateBifurcation(const State &start, const State &end, const Point &before, double length, std::optional<CriticalPoint> *point);
+  PetscErrorCode switchBranch(const CriticalPoint &critical, double length, double shortest, State *state, bool *switched);
 };
 
 } // namespace tendril
