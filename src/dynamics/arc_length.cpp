@@ -204,6 +204,27 @@ PetscErrorCode ArcLength::begin(const State &state, Point *direction) {
   PetscFunctionReturn(0);
 }
 
+/// Where a motion costs nothing, solves the start of a step and its tangent again, and what follows, to a sharper tolerance: a turn about an axis that costs
+/// nothing in equilibrium has a stiffness of the residual, which may be larger than what holds it and of the other sign. Then steps go along it.
+PetscErrorCode ArcLength::refine(State &state, Point *direction, bool *refined) {
+  constexpr double little = 1e-4; // of the softest bending
+  PetscFunctionBeginUser;
+  PetscCall(begin(state, direction));
+  if (negative_ < 0) PetscFunctionReturn(0);
+  int low, high;
+  PetscCall(solver_.inertiaAtIterate(&low, -little));
+  PetscCall(solver_.inertiaAtIterate(&high, little));
+  if (low <= high) PetscFunctionReturn(0);
+  sharpness_ = 1e-2;
+  PetscCall(correct(state.time, *direction, 0, refined));
+  if (!*refined) PetscFunctionReturn(0);
+  const std::int64_t number = state.step;
+  solver_.potential().commit(state);
+  state.step = number;
+  PetscCall(tangent(direction));
+  PetscFunctionReturn(0);
+}
+
 /// One step along the path, or `along` another direction; the potential's iterate is its end when it converged.
 PetscErrorCode ArcLength::step(const State &state, double length, bool *converged, const Point *along) {
   constexpr double straying = 1.5; // of the step's length, from tangent to chord below 48 degrees: beyond it may be another branch
@@ -211,6 +232,7 @@ PetscErrorCode ArcLength::step(const State &state, double length, bool *converge
   *converged = false;
   iterations_ = 0;
   obstacle_.clear();
+  astray_ = false;
   IncrementalPotential &potential = solver_.potential();
   Point direction;
   PetscCall(begin(state, &direction));
@@ -229,10 +251,9 @@ PetscErrorCode ArcLength::step(const State &state, double length, bool *converge
   potential.coordinates(moved.unknowns);
   moved.factor = potential.step().load_factor - state.time;
   *converged = product(moved, moved) < straying * straying * length * length;
-  if (*converged)
-    last_ = moved;
-  else
-    obstacle_ = "the step strayed from the path; take more -load_steps, so that steps begin shorter";
+  if (*converged) last_ = moved;
+  astray_ = !*converged;
+  if (astray_) obstacle_ = "the step strayed from the path; take more -load_steps, so that steps begin shorter";
   PetscFunctionReturn(0);
 }
 
@@ -381,7 +402,8 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
       crossed = negative != negative_;
       const bool odd = (negative - negative_) % 2 != 0, turns = slope * end.factor < 0;
       const bool doubtful = odd != turns && potential.scene().moments.empty() && length > first / 16;
-      if (doubtful || product(direction, end) < least_alignment) {
+      astray_ = doubtful || product(direction, end) < least_alignment;
+      if (astray_) {
         converged = false;
         obstacle_ = "the path turns too sharply; take more -load_steps, so that steps begin shorter";
       }
@@ -408,9 +430,11 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     }
     if (!converged) { // the state was not touched
       last_ = before_step;
+      bool refined = false;
+      if (astray_ && sharpness_ == 1) PetscCall(refine(state, &direction, &refined));
       ++rejected;
       in_vain += iterations_;
-      length *= 0.5;
+      if (!refined) length *= 0.5;
       if (length >= shortest) continue;
       std::ostringstream message;
       message << "step along the path at load factor " << state.time << " failed with length " << 2 * length << " after " << iterations_
