@@ -250,7 +250,8 @@ PetscErrorCode ArcLength::step(const State &state, double length, bool *converge
   Point moved;
   potential.coordinates(moved.unknowns);
   moved.factor = potential.step().load_factor - state.time;
-  *converged = product(moved, moved) < straying * straying * length * length;
+  const double way = along ? size(moved) : std::sqrt(product(moved, moved)); // the load may rise as steeply as it will on a branch that leaves
+  *converged = way < straying * length;
   if (*converged) last_ = moved;
   astray_ = !*converged;
   if (astray_) obstacle_ = "the step strayed from the path; take more -load_steps, so that steps begin shorter";
@@ -338,6 +339,7 @@ PetscErrorCode ArcLength::locateBifurcation(const State &start, const State &end
 
 /// A step from a critical point along its mode, onto the branch that leaves there (Keller 1977): Newton for equilibrium and the plane normal to the mode.
 PetscErrorCode ArcLength::switchBranch(const CriticalPoint &critical, double length, double shortest, State *state, bool *switched) {
+  constexpr double least = 1e-3; // what cannot get shorter hardly bends while the load rises a lot
   PetscFunctionBeginUser;
   Step here;
   here.mixed = settings_.mixed;
@@ -352,7 +354,7 @@ PetscErrorCode ArcLength::switchBranch(const CriticalPoint &critical, double len
   }
   const double norm = size(mode);
   for (double &d : mode.unknowns) d /= norm;
-  for (; !*switched && length >= shortest; length *= 0.5) PetscCall(step(*critical.state, length, switched, &mode));
+  for (; !*switched && length >= least * shortest; length *= 0.5) PetscCall(step(*critical.state, length, switched, &mode));
   if (!*switched) PetscFunctionReturn(0);
   *state = *critical.state;
   solver_.potential().commit(*state);

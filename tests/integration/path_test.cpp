@@ -470,6 +470,27 @@ TEST(SwitchedBranch, IsThatOfTheCriticalModeWhereAnotherMotionCostsNothing) {
   EXPECT_NEAR(across[1], across[0], 1e-5); // the same shape, each to Newton's 1e-6 of the load
 }
 
+/// A column between pins, pushed down in its middle: half of it buckles, but it cannot get shorter, so that the load rises steeply.
+TEST(SwitchedBranch, MayRiseSteeply) {
+  constexpr int edges = 32;
+  Scene scene = clampedScene(straightRod(edges));
+  scene.supports = {hold(scene, 0, 0, Support::Kind::pin), hold(scene, 0, edges, Support::Kind::pin)};
+  scene.rods[0].material.axial_stiffness = 1e8;
+  scene.forces = {{0, edges / 2, Vec3(-120, 0, 0)}};
+  std::array<double, 2> bent{};
+  for (const bool arclength : {false, true}) {
+    LoopSettings settings = arclength ? along(20, 200) : statics(20);
+    settings.bifurcation = Bifurcation::switch_branch;
+    const Path path = follow(scene, settings);
+    ASSERT_EQ(path.critical.size(), 1u) << arclength;
+    ASSERT_EQ(path.end.time, 1) << arclength;
+    EXPECT_EQ(path.negative.back(), 0) << arclength;
+    for (const Vec3 &x : path.end.position) bent[arclength] = std::max(bent[arclength], x.tail<2>().norm());
+  }
+  EXPECT_GT(bent[0], 1e-4);
+  EXPECT_NEAR(bent[1], bent[0], 1e-3 * bent[0]); // Newton's 1e-6 of the load, of which bending carries little
+}
+
 TEST(CriticalFactor, IsFoundInTheFirstLoadStep) {
   const Path path = follow(deepArch(64, 1000), along(20, 30));
   ASSERT_GE(path.critical.size(), 1u);
