@@ -6,6 +6,9 @@
 
 namespace tendril {
 
+constexpr const char *cannot_factor = "the Hessian cannot be factored; take more -load_steps, or look for rods that nothing holds";
+constexpr const char *vanishing_edge = "an edge vanishes or turns back on itself; use more edges, or a larger axial_stiffness";
+
 /// Of the Hessian's eigenvalues, in units of the softest bending: keeps solves regular where a motion costs nothing, a turn about an axis, say.
 constexpr double lift = 1e-7;
 
@@ -69,7 +72,10 @@ PetscErrorCode ArcLength::findStart(State &state) {
   NewtonReport report;
   PetscCall(solver_.solve(state, step, &report));
   if (!report.converged) {
-    failure_ = "no equilibrium to start the path from: " + report.reason;
+    std::ostringstream message;
+    message << "no equilibrium at load factor " << state.time << " to start the path from: " << report.reason
+            << "; draw the rods nearer to their shape without load, or use -continuation load";
+    failure_ = message.str();
     PetscFunctionReturn(0);
   }
   const std::int64_t number = state.step;
@@ -104,7 +110,7 @@ PetscErrorCode ArcLength::solve(const Planes &gradient, Planes *step) {
 PetscErrorCode ArcLength::tangent(Point *direction) {
   PetscFunctionBeginUser;
   PetscCall(solver_.inertiaAtIterate(&negative_, lift));
-  if (negative_ < 0) obstacle_ = "the Hessian cannot be factored";
+  if (negative_ < 0) obstacle_ = cannot_factor;
   direction->factor = 1;
   PetscCall(solveLoad(&direction->unknowns));
   const double side = last_.unknowns.size() == 0 ? 1 : product(*direction, last_), norm = std::sqrt(product(*direction, *direction));
@@ -137,7 +143,7 @@ PetscErrorCode ArcLength::iterate(const std::function<double(const Point &moved,
   for (int k = 0; k <= most_iterations; ++k) {
     const IncrementalPotential::Residual residual = potential.residual();
     if (!std::isfinite(residual.force) || !std::isfinite(residual.moment)) {
-      obstacle_ = "the forces are not finite";
+      obstacle_ = "the forces are not finite; look at the loads and stiffnesses of the scene";
       PetscFunctionReturn(0);
     }
     // Rounding may keep the residual above its tolerance: then what the last correction moved must be little.
@@ -147,7 +153,7 @@ PetscErrorCode ArcLength::iterate(const std::function<double(const Point &moved,
     int negative;
     PetscCall(solver_.inertiaAtIterate(&negative, lift));
     if (negative < 0) {
-      obstacle_ = "the Hessian cannot be factored";
+      obstacle_ = cannot_factor;
       PetscFunctionReturn(0);
     }
     Point moved, correction, load;
@@ -162,11 +168,11 @@ PetscErrorCode ArcLength::iterate(const std::function<double(const Point &moved,
     little = size(correction) <= allowance(moved);
     ++iterations_;
     if (!move(correction.unknowns, potential.step().load_factor + change)) {
-      obstacle_ = "an edge vanishes or turns back on itself";
+      obstacle_ = vanishing_edge;
       PetscFunctionReturn(0);
     }
   }
-  obstacle_ = "the corrector did not converge";
+  obstacle_ = "the corrector did not converge; take more -load_steps, so that steps begin shorter";
   PetscFunctionReturn(0);
 }
 
@@ -198,6 +204,27 @@ PetscErrorCode ArcLength::begin(const State &state, Point *direction) {
   PetscFunctionReturn(0);
 }
 
+/// Where a motion costs nothing, solves the start of a step and its tangent again, and what follows, to a sharper tolerance: a turn about an axis that costs
+/// nothing in equilibrium has a stiffness of the residual, which may be larger than what holds it and of the other sign. Then steps go along it.
+PetscErrorCode ArcLength::refine(State &state, Point *direction, bool *refined) {
+  constexpr double little = 1e-4; // of the softest bending
+  PetscFunctionBeginUser;
+  PetscCall(begin(state, direction));
+  if (negative_ < 0) PetscFunctionReturn(0);
+  int low, high;
+  PetscCall(solver_.inertiaAtIterate(&low, -little));
+  PetscCall(solver_.inertiaAtIterate(&high, little));
+  if (low <= high) PetscFunctionReturn(0);
+  sharpness_ = 1e-2;
+  PetscCall(correct(state.time, *direction, 0, refined));
+  if (!*refined) PetscFunctionReturn(0);
+  const std::int64_t number = state.step;
+  solver_.potential().commit(state);
+  state.step = number;
+  PetscCall(tangent(direction));
+  PetscFunctionReturn(0);
+}
+
 /// One step along the path, or `along` another direction; the potential's iterate is its end when it converged.
 PetscErrorCode ArcLength::step(const State &state, double length, bool *converged, const Point *along) {
   constexpr double straying = 1.5; // of the step's length, from tangent to chord below 48 degrees: beyond it may be another branch
@@ -205,6 +232,7 @@ PetscErrorCode ArcLength::step(const State &state, double length, bool *converge
   *converged = false;
   iterations_ = 0;
   obstacle_.clear();
+  astray_ = false;
   IncrementalPotential &potential = solver_.potential();
   Point direction;
   PetscCall(begin(state, &direction));
@@ -213,7 +241,7 @@ PetscErrorCode ArcLength::step(const State &state, double length, bool *converge
   Point predicted = direction;
   for (double &d : predicted.unknowns) d *= length;
   if (!move(predicted.unknowns, state.time + length * direction.factor)) {
-    obstacle_ = "an edge vanishes or turns back on itself";
+    obstacle_ = vanishing_edge;
     PetscFunctionReturn(0);
   }
   PetscCall(correct(state.time, direction, length, converged));
@@ -222,11 +250,11 @@ PetscErrorCode ArcLength::step(const State &state, double length, bool *converge
   Point moved;
   potential.coordinates(moved.unknowns);
   moved.factor = potential.step().load_factor - state.time;
-  *converged = product(moved, moved) < straying * straying * length * length;
-  if (*converged)
-    last_ = moved;
-  else
-    obstacle_ = "the step strayed from the path";
+  const double way = along ? size(moved) : std::sqrt(product(moved, moved)); // the load may rise as steeply as it will on a branch that leaves
+  *converged = way < straying * length;
+  if (*converged) last_ = moved;
+  astray_ = !*converged;
+  if (astray_) obstacle_ = "the step strayed from the path; take more -load_steps, so that steps begin shorter";
   PetscFunctionReturn(0);
 }
 
@@ -271,7 +299,8 @@ PetscErrorCode ArcLength::locateLimit(const State &start, const Point &before, c
 }
 
 /// The point between the ends of a step where the count of unstable motions changes while the load factor does not turn.
-PetscErrorCode ArcLength::locateBifurcation(const State &start, const Point &before, double length, std::optional<CriticalPoint> *located) {
+PetscErrorCode ArcLength::locateBifurcation(const State &start, const State &end, const Point &before, double length, std::optional<CriticalPoint> *located) {
+  constexpr double no_load = 1e-4; // of the step
   PetscFunctionBeginUser;
   const Point after = std::exchange(last_, before);
   const int iterations = iterations_, negative = negative_;
@@ -299,7 +328,9 @@ PetscErrorCode ArcLength::locateBifurcation(const State &start, const Point &bef
   last_ = after;
   iterations_ = iterations;
   negative_ = negative;
-  if (!found) PetscFunctionReturn(0);
+  // Where the load passes zero, what may turn about an axis costs nothing and becomes unstable, or stable: that is no critical load.
+  const bool unloaded = std::abs(point.load_factor) < no_load * std::abs(start.time - end.time);
+  if (!found || unloaded) PetscFunctionReturn(0);
   point.state->step = start.step;
   point.limit = false;
   *located = point;
@@ -307,20 +338,25 @@ PetscErrorCode ArcLength::locateBifurcation(const State &start, const Point &bef
 }
 
 /// A step from a critical point along its mode, onto the branch that leaves there (Keller 1977): Newton for equilibrium and the plane normal to the mode.
-PetscErrorCode ArcLength::switchBranch(const State &critical, double length, double shortest, State *state, bool *switched) {
+PetscErrorCode ArcLength::switchBranch(const CriticalPoint &critical, double length, double shortest, State *state, bool *switched) {
+  constexpr double least = 1e-3; // what cannot get shorter hardly bends while the load rises a lot
   PetscFunctionBeginUser;
+  Step here;
+  here.mixed = settings_.mixed;
   Point mode;
   last_ = {};
-  obstacle_.clear();
-  PetscCall(begin(critical, &mode));
-  PetscCall(solver_.softestMode(&mode.unknowns));
-  mode.factor = 0;
+  *switched = false;
+  bool found;
+  PetscCall(criticalMode(solver_, critical, here, &mode.unknowns, &found));
+  if (!found) {
+    obstacle_ = "the path could not be followed past it; take more -load_steps";
+    PetscFunctionReturn(0);
+  }
   const double norm = size(mode);
   for (double &d : mode.unknowns) d /= norm;
-  *switched = false;
-  for (; !*switched && length >= shortest; length *= 0.5) PetscCall(step(critical, length, switched, &mode));
+  for (; !*switched && length >= least * shortest; length *= 0.5) PetscCall(step(*critical.state, length, switched, &mode));
   if (!*switched) PetscFunctionReturn(0);
-  *state = critical;
+  *state = *critical.state;
   solver_.potential().commit(*state);
   PetscFunctionReturn(0);
 }
@@ -343,7 +379,8 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
   PetscCall(tangent(&direction));
   rounding_ = 0;
   for (int r = 0; r < potential.all().end; ++r)
-    rounding_ = std::max(rounding_, 4 * std::numeric_limits<double>::epsilon() * std::max(1.0, potential.rodEnergy(potential.iterate(), r).reach / potential.length(r)));
+    rounding_ = std::max(rounding_,
+                         4 * std::numeric_limits<double>::epsilon() * std::max(1.0, potential.rodEnergy(potential.iterate(), r).reach / potential.length(r)));
   load_reach_ = size(direction) / std::abs(direction.factor);
   const double first = settings_.dt / direction.factor; // as long as a load step of dt
   const double shortest = first * (settings_.dt_min > 0 ? settings_.dt_min / settings_.dt : 1.0 / 1024);
@@ -367,9 +404,10 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
       crossed = negative != negative_;
       const bool odd = (negative - negative_) % 2 != 0, turns = slope * end.factor < 0;
       const bool doubtful = odd != turns && potential.scene().moments.empty() && length > first / 16;
-      if (doubtful || product(direction, end) < least_alignment) {
+      astray_ = doubtful || product(direction, end) < least_alignment;
+      if (astray_) {
         converged = false;
-        obstacle_ = "the path turns too sharply";
+        obstacle_ = "the path turns too sharply; take more -load_steps, so that steps begin shorter";
       }
     }
     bool little = true;
@@ -377,30 +415,32 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     if (!little && sharpness_ > 1e-6) { // a tolerance relative to all loads may be too dull for what they move
       sharpness_ *= 1e-2;
       converged = false;
-      obstacle_ = "what Newton would still move it by is not little";
+      obstacle_ = "what Newton would still move it by is not little; lower -snes_rtol or use fewer edges";
       little = true;
     }
     if (!little) {
       std::ostringstream message;
-      message << "step along the path at factor " << state.time << " is lost in rounding: Newton would still move it by " << left_ << " of the length, it moves "
-              << size(last_) << " (-rounding_tolerance " << potential.rounding_tolerance << "); use fewer edges";
+      message << "step along the path at load factor " << state.time << " is lost in rounding: Newton would still move it by " << left_
+              << " of the length, it moves " << size(last_) << " (-rounding_tolerance " << potential.rounding_tolerance << "); use fewer edges";
       failure_ = message.str();
       PetscFunctionReturn(0);
     }
     // Full load lies before a limit point above it: shorter steps end on the near side.
     if (converged && slope * end.factor < 0 && potential.step().time >= settings_.t_end) {
       converged = false;
-      obstacle_ = "a limit point lies just above full load";
+      obstacle_ = "a limit point lies just above full load; raise the loads, so that the path passes it";
     }
     if (!converged) { // the state was not touched
       last_ = before_step;
+      bool refined = false;
+      if (astray_ && sharpness_ == 1) PetscCall(refine(state, &direction, &refined));
       ++rejected;
       in_vain += iterations_;
-      length *= 0.5;
+      if (!refined) length *= 0.5;
       if (length >= shortest) continue;
       std::ostringstream message;
-      message << "step along the path at factor " << state.time << " failed with length " << 2 * length << ": " << obstacle_ << " (" << iterations_
-              << " iterations)";
+      message << "step along the path at load factor " << state.time << " failed with length " << 2 * length << " after " << iterations_
+              << " iterations: " << obstacle_;
       failure_ = message.str();
       PetscFunctionReturn(0);
     }
@@ -414,7 +454,7 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     if (locates && slope * direction.factor < 0)
       PetscCall(locateLimit(start, before_step, {slope, direction.factor}, length, &critical));
     else if (locates && crossed && potential.scene().moments.empty())
-      PetscCall(locateBifurcation(start, before_step, length, &critical));
+      PetscCall(locateBifurcation(start, state, before_step, length, &critical));
     if (critical && on_critical) PetscCall(on_critical(*critical));
     if (critical && settings_.bifurcation == Bifurcation::stop) {
       state = *critical->state;
@@ -423,9 +463,11 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     }
     if (critical && !critical->limit && settings_.bifurcation == Bifurcation::switch_branch) {
       bool switched;
-      PetscCall(switchBranch(*critical->state, length, shortest, &state, &switched));
+      PetscCall(switchBranch(*critical, length, shortest, &state, &switched));
       if (!switched) {
-        failure_ = "no branch was found along the critical mode: " + obstacle_;
+        std::ostringstream message;
+        message << "no branch was found along the critical mode at load factor " << critical->load_factor << ": " << obstacle_;
+        failure_ = message.str();
         state = *critical->state;
         PetscFunctionReturn(0);
       }

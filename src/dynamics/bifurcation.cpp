@@ -38,10 +38,21 @@ void SharpTolerance::set(PetscReal rtol) {
   }
 }
 
+constexpr double neutral = 1e-9; // of the softest bending: above what Newton and rounding leave of a motion that costs nothing
+
 PetscErrorCode countUnstable(StepSolver &solver, int *unstable) {
-  constexpr double neutral = 1e-9; // of the softest bending: above what Newton and rounding leave of a motion that costs nothing
   PetscFunctionBeginUser;
   PetscCall(solver.inertiaAtIterate(unstable, neutral));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode criticalMode(StepSolver &solver, const CriticalPoint &point, Step step, Planes *mode, bool *found) {
+  PetscFunctionBeginUser;
+  *found = false;
+  if (!point.lost) PetscFunctionReturn(0);
+  step.time = step.load_factor = point.lost->time;
+  solver.begin(*point.lost, step);
+  PetscCall(solver.criticalMode(point.stable_count, neutral, mode, found));
   PetscFunctionReturn(0);
 }
 
@@ -73,16 +84,19 @@ PetscErrorCode locateCritical(const Follow &follow, BranchPoint low, double high
   const double end = high, aside = std::max(part * (high - low.parameter), 1e-5 * scale);
   double last = std::nan(""); // what the round before found
   bool ahead = false;         // whether the branch was found beyond
-  BranchPoint beyond;
+  BranchPoint before, beyond;
   PetscCall(follow(low, end, &beyond));
   for (int round = 0; round < most_rounds && !(beyond.found && beyond.unstable == low.unstable); ++round) {
-    BranchPoint base, before;
+    BranchPoint base;
     PetscCall(bisect(follow, &low, &base, high, interval * scale, aside));
     if (std::abs(low.state.time - last) <= agreement * std::abs(last)) {
       *found = true;
       point->load_factor = low.state.time;
       point->limit = !ahead;
       point->state = low.state;
+      point->lost.reset();
+      if (ahead) point->lost = (beyond.unstable > low.unstable ? beyond : before).state;
+      point->stable_count = std::min(low.unstable, beyond.unstable);
       PetscFunctionReturn(0);
     }
     last = low.state.time;

@@ -52,15 +52,12 @@ PetscErrorCode TimeLoop::locate(State &start, const Step &step, bool *moved) {
   point.state->step = start.step;
   located_ = point.load_factor;
   if (on_critical) PetscCall(on_critical(point));
-  const bool leaves = settings_.bifurcation == Bifurcation::switch_branch && !point.limit;
+  bool leaves = false;
+  Planes mode;
+  if (settings_.bifurcation == Bifurcation::switch_branch) PetscCall(criticalMode(solver_, point, step, &mode, &leaves));
+  if (leaves) mode_ = std::move(mode);
   *moved = settings_.bifurcation == Bifurcation::stop || leaves;
-  if (!*moved) PetscFunctionReturn(0);
-  start = *point.state;
-  if (!leaves) PetscFunctionReturn(0);
-  Step here = step;
-  here.time = here.load_factor = start.time;
-  solver_.begin(start, here);
-  PetscCall(solver_.softestMode(&mode_.emplace()));
+  if (*moved) start = *point.state;
   PetscFunctionReturn(0);
 }
 
@@ -304,7 +301,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     const bool detects = !settings_.dynamic && settings_.bifurcation != Bifurcation::off && potential.scene().moments.empty();
     // Newton may pass an unstable equilibrium and only meet indefinite Hessians. Who asks for a critical load has that looked into.
     const bool asks = settings_.bifurcation == Bifurcation::stop || settings_.bifurcation == Bifurcation::switch_branch;
-    const bool passed = report.first_negative_pivots > 0 || (asks && report.shifts > 0 && state.time > 0);
+    const bool passed = report.first_negative_pivots > 0 || (asks && report.shifts > 0);
     if (detects && stable && passed && located_ <= state.time) {
       bool moved = false;
       const State before = state;

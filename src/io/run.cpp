@@ -3,6 +3,7 @@
 #include "tendril/dynamics/arc_length.hpp"
 #include "tendril/dynamics/simulation.hpp"
 #include "tendril/energy/widest_angle.hpp"
+#include "tendril/io/accuracy.hpp"
 #include "tendril/io/checkpoint.hpp"
 #include "tendril/io/keys.hpp"
 #include "tendril/io/option_files.hpp"
@@ -38,12 +39,18 @@ std::string groupsText(const Scene &scene) {
         << g.largest_twist << " deg per vertex\n";
   }
   if (shown < scene.rods.size()) s << "... and " << scene.rods.size() - shown << " more rods\n";
+  constexpr double soft = 1e-4; // of the rod's own bending
   double turning = 0, twist = 0;
+  bool told = false;
   for (const Rod &rod : scene.rods) {
     if (rod.material.isCable()) continue; // free to fold
     const DimensionlessGroups g = dimensionlessGroups(rod, scene.gravity);
     turning = std::max(turning, g.largest_turning);
     twist = std::max(twist, g.largest_twist);
+    if (told || !(g.corner_softness > soft)) continue;
+    s << "warning: rod '" << rod.name << "' has a corner at vertex " << g.softest_corner << ", which 'energy: seed' makes softer by "
+      << shortText(g.corner_softness) << " of the bending of the whole rod, more with shorter edges, for stretch turns it; use 'energy: classical'\n";
+    told = true;
   }
   if (turning > 30 || twist > 30)
     s << "warning: neighbouring edges turn or twist by up to " << std::max(turning, twist)
@@ -354,7 +361,8 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
     if (!o.loop.dynamic && row.negative_pivots > 0 && !warned) {
       const std::string count = std::to_string(row.negative_pivots) + (row.negative_pivots == 1 ? " negative pivot" : " negative pivots");
       progress.say(run.scene.moments.empty()
-                       ? "from here on, where negative_pivots in the diagnostics is not 0, the path is unstable: " + count
+                       ? "at load factor " + shortText(row.time) +
+                             " the path is unstable, as it is wherever negative_pivots in the diagnostics is not 0: " + count
                        : "warning: " + count + " at an accepted state with couples: couples have no potential, so its stability is not known");
       warned = true;
     }
@@ -390,6 +398,11 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
     failure = loop.failure();
   }
   const bool stopped = !finished && failure.empty();
+  if (arclength && finished && run.state.time < o.loop.t_end && steps >= o.loop.arclength_steps) {
+    std::ostringstream line;
+    line << "the path ends at load factor " << run.state.time << " after " << steps << " steps; to follow it on, raise -arclength_steps";
+    progress.say(line.str());
+  }
   if (stopped && trajectory.lastTime() < run.state.time) trajectory.writeFrame(run.state);
   PetscCall(PetscLogEventBegin(events().output, 0, 0, 0, 0));
   const Summary at_end = summarize(run.scene, *run.elements, run.state, o.loop.dynamic ? 1 : run.state.time);

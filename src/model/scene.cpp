@@ -143,7 +143,13 @@ DimensionlessGroups dimensionlessGroups(const Rod &rod, const Vec3 &gravity) {
     const int a = rod.edgeBefore(v), b = rod.edgeAfter(v);
     if (a < 0 || b < 0) continue;
     const Frame f0 = referenceFrame(rod, a), f1 = referenceFrame(rod, b);
-    g.largest_turning = std::max(g.largest_turning, degrees(std::acos(std::clamp(f0.tangent.dot(f1.tangent), -1.0, 1.0))));
+    const double turning = std::acos(std::clamp(f0.tangent.dot(f1.tangent), -1.0, 1.0));
+    g.largest_turning = std::max(g.largest_turning, degrees(turning));
+    const double softness = turning * turning * g.length / (g.axial_to_bending * (rod.edge(a).norm() + rod.edge(b).norm()));
+    if (rod.energy == Energy::seed && rod.natural == Rod::Natural::as_drawn && turning > pi / 6 && softness > g.corner_softness) {
+      g.corner_softness = softness;
+      g.softest_corner = v;
+    }
     g.largest_twist = std::max(g.largest_twist, std::abs(degrees(halfAngleBetween(f0, f1).angle())));
   }
   return g;

@@ -159,15 +159,28 @@ double NewtonSolver::turningOf(int r) const {
   return turning;
 }
 
-/// Inverse iteration.
-PetscErrorCode NewtonSolver::softestMode(double *softest, Planes *mode) {
+/// Bisection of the lift on the inertia, then inverse iteration beside the eigenvalue found: motions that cost nothing have another one, if only by little.
+PetscErrorCode NewtonSolver::criticalMode(int stable, double *lift, Planes *mode) {
   constexpr int iterations = 12;
-  int negative;
+  constexpr double close = 1.01, highest = 1e12; // ratio of the ends of the interval: each iteration gains a factor of 100
   PetscFunctionBeginUser;
-  PetscCall(inertiaAtIterate(&negative));
+  int negative;
+  double low = *lift, high = low;
+  PetscCall(inertiaAtIterate(&negative, low));
+  if (negative <= stable) PetscFunctionReturn(0);
+  while (negative > stable && high < highest) {
+    low = std::exchange(high, 4 * high);
+    PetscCall(inertiaAtIterate(&negative, high));
+  }
+  while (high > close * low) {
+    const double middle = std::sqrt(low * high);
+    PetscCall(inertiaAtIterate(&negative, middle));
+    (negative > stable ? low : high) = middle;
+  }
+  *lift = high;
+  PetscCall(inertiaAtIterate(&negative, high));
   beginMode();
   normaliseMode();
-  double stiffness = HUGE_VAL;
   for (int k = 0; k < iterations; ++k) {
     Planes right = potential_->dofs().makePlanes();
     for (int r = rods_.begin; r < rods_.end; ++r) {
@@ -176,10 +189,8 @@ PetscErrorCode NewtonSolver::softestMode(double *softest, Planes *mode) {
         for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) right[a][s] = work_->metric[a][s] * work_->increment[a][s];
     }
     PetscCall(solveLinear(right, work_->increment));
-    stiffness = 1 / normaliseMode();
+    normaliseMode();
   }
-  if (!(stiffness < *softest)) PetscFunctionReturn(0);
-  *softest = stiffness;
   double turning = 0;
   for (int r = rods_.begin; r < rods_.end; ++r) turning = std::max(turning, turningOf(r));
   for (double &d : work_->increment) d /= turning;

@@ -131,13 +131,12 @@ PetscErrorCode StepSolver::inertiaAtIterate(int *negative, double lift) {
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode StepSolver::softestMode(Planes *mode) {
-  double softest = HUGE_VAL;
+PetscErrorCode StepSolver::criticalMode(int stable, double neutral, Planes *mode, bool *found) {
+  double lift = neutral;
   PetscFunctionBeginUser;
   *mode = potential_->dofs().makePlanes();
-  for (NewtonSolver &block : blocks_) {
-    PetscCall(block.softestMode(&softest, mode));
-  }
+  for (NewtonSolver &block : blocks_) PetscCall(block.criticalMode(stable, &lift, mode));
+  *found = lift > neutral;
   PetscFunctionReturn(0);
 }
 

@@ -432,6 +432,197 @@ TEST(SwitchedBranch, OfADeepArchSways) {
   EXPECT_NEAR(load_steps.end.position[16].y(), path.end.position[16].y(), 1e-4 * radius);
 }
 
+/// Half a circle between pins, pushed together at its quarters along the line through them, about which it turns as it likes: no critical load and no mode to
+/// follow. A round one leaves its plane.
+TEST(SwitchedBranch, IsThatOfTheCriticalModeWhereAnotherMotionCostsNothing) {
+  constexpr int edges = 32;
+  Rod rod;
+  rod.measure = Measure::angle;
+  for (int i = 0; i <= edges; ++i) {
+    const double angle = pi / 2 * (1 - 2.0 * i / edges);
+    rod.position.emplace_back(-std::sin(angle), std::cos(angle), 0);
+  }
+  rod.material = {1, 1e-6, 1e6, 1, {1, 1}, 0, 0};
+  setBishopDirectors(rod, Vec3::UnitZ());
+  Scene scene;
+  scene.gravity = Vec3::Zero();
+  scene.rods = {rod};
+  scene.supports = {hold(scene, 0, 0, Support::Kind::pin), hold(scene, 0, edges, Support::Kind::pin)};
+  scene.forces = {{0, edges / 4, Vec3(60, 0, 0)}, {0, 3 * edges / 4, Vec3(-60, 0, 0)}};
+  std::array<double, 2> across{}, factor{};
+  for (const bool arclength : {false, true}) {
+    SCOPED_TRACE(arclength ? "along the arc length" : "by load steps");
+    LoopSettings settings = arclength ? along(20, 200) : statics(20);
+    settings.bifurcation = Bifurcation::switch_branch;
+    const Path path = follow(scene, settings);
+    ASSERT_EQ(path.critical.size(), 1u);
+    EXPECT_FALSE(path.critical[0].limit);
+    ASSERT_EQ(path.end.time, 1);
+    EXPECT_EQ(path.negative.back(), 0); // it leaves to the side that lowers its energy
+    factor[arclength] = path.critical[0].load_factor;
+    // Its points lie in no plane through the line, whatever it has turned by: the two moments of their places across it.
+    Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
+    for (const Vec3 &x : path.end.position) moments += x.tail<2>() * x.tail<2>().transpose();
+    across[arclength] = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(moments).eigenvalues()[0];
+    EXPECT_GT(across[arclength], 0.1);
+  }
+  EXPECT_NEAR(factor[1], factor[0], step_tolerance * factor[0]);
+  EXPECT_NEAR(across[1], across[0], 1e-5); // the same shape, each to Newton's 1e-6 of the load
+}
+
+/// A column between pins, pushed down in its middle: half of it buckles, but it cannot get shorter, so that the load rises steeply.
+TEST(SwitchedBranch, MayRiseSteeply) {
+  constexpr int edges = 32;
+  Scene scene = clampedScene(straightRod(edges));
+  scene.supports = {hold(scene, 0, 0, Support::Kind::pin), hold(scene, 0, edges, Support::Kind::pin)};
+  scene.rods[0].material.axial_stiffness = 1e8;
+  scene.forces = {{0, edges / 2, Vec3(-120, 0, 0)}};
+  std::array<double, 2> bent{};
+  for (const bool arclength : {false, true}) {
+    LoopSettings settings = arclength ? along(20, 200) : statics(20);
+    settings.bifurcation = Bifurcation::switch_branch;
+    const Path path = follow(scene, settings);
+    ASSERT_EQ(path.critical.size(), 1u) << arclength;
+    ASSERT_EQ(path.end.time, 1) << arclength;
+    EXPECT_EQ(path.negative.back(), 0) << arclength;
+    for (const Vec3 &x : path.end.position) bent[arclength] = std::max(bent[arclength], x.tail<2>().norm());
+  }
+  EXPECT_GT(bent[0], 1e-4);
+  EXPECT_NEAR(bent[1], bent[0], 1e-3 * bent[0]); // Newton's 1e-6 of the load, of which bending carries little
+}
+
+TEST(CriticalFactor, IsFoundInTheFirstLoadStep) {
+  const Path path = follow(deepArch(64, 1000), along(20, 30));
+  ASSERT_GE(path.critical.size(), 1u);
+  const double factor = path.critical[0].load_factor;
+  for (const bool arclength : {false, true}) {
+    LoopSettings settings = arclength ? along(1, 30) : statics(1);
+    settings.bifurcation = Bifurcation::stop;
+    const Path stopped = follow(deepArch(64, 1000), settings);
+    ASSERT_EQ(stopped.critical.size(), 1u) << arclength;
+    EXPECT_TRUE(stopped.critical[0].limit) << arclength;
+    EXPECT_NEAR(stopped.critical[0].load_factor, factor, step_tolerance) << arclength;
+    EXPECT_EQ(stopped.end, *stopped.critical[0].state) << arclength;
+  }
+  // Of a scene with none a first step that meets indefinite Hessians finds none: a cantilever bent far over.
+  Scene scene = clampedScene(straightRod(32));
+  scene.forces = {{0, 32, Vec3(0, -20, 0)}};
+  const Path none = follow(scene, stopping(1));
+  EXPECT_TRUE(none.critical.empty());
+  EXPECT_EQ(none.end.time, 1);
+}
+
+/// Lee's frame: two members of length 120, joined rigidly and hinged at their ends, pushed down 24 from the corner (data/reference/frames_lee.csv). As one
+/// polyline; without `held` it may turn about the line through its hinges.
+struct LeeFrame {
+  static constexpr double load = 2, member = 120;
+  int edges;
+  Energy energy = Energy::classical;
+  bool held = true;
+  double axial_stiffness = 4320;
+
+  Scene scene(const Mat3 &turn = Mat3::Identity(), const Vec3 &place = Vec3::Zero()) const {
+    const int leg = edges / 2;
+    Rod rod;
+    rod.name = "frame";
+    for (int i = 0; i <= leg; ++i) rod.position.push_back(turn * Vec3(0, member * i / leg, 0) + place);
+    for (int i = 1; i <= leg; ++i) rod.position.push_back(turn * Vec3(member * i / leg, member, 0) + place);
+    rod.material = {1, 0, axial_stiffness, 1000, {1440, 1440}, 0, 0};
+    rod.measure = Measure::angle;
+    rod.energy = energy;
+    setBishopDirectors(rod, turn * Vec3::UnitZ());
+    Scene scene;
+    scene.gravity = Vec3::Zero();
+    scene.rods = {rod};
+    scene.supports = {hold(scene, 0, 0, Support::Kind::pin), hold(scene, 0, edges, Support::Kind::pin)};
+    if (held) scene.supports.push_back(hold(scene, 0, 0, Support::Kind::fix_twist));
+    scene.forces = {{0, leg + leg / 5, turn * Vec3(0, -load, 0)}};
+    return scene;
+  }
+
+  /// Limit points of the path to full load, in its order: a maximum, and a minimum behind it.
+  std::vector<CriticalPoint> limits() const {
+    const Path path = follow(scene(), along(20, 200));
+    EXPECT_EQ(path.end.time, 1);
+    std::vector<CriticalPoint> limits;
+    for (const CriticalPoint &point : path.critical) {
+      if (point.limit) limits.push_back(point);
+      EXPECT_GT(std::abs(point.load_factor), 1e-2); // at no load the frame turns about its hinges: that is no critical load
+    }
+    EXPECT_EQ(limits.size(), 2u);
+    limits.resize(2);
+    return limits;
+  }
+
+  static double reference(const std::string &row) {
+    std::ifstream in(std::string(TENDRIL_SOURCE_DIR) + "/data/reference/frames_lee.csv");
+    for (std::string line; std::getline(in, line);)
+      if (line.rfind(row + ",", 0) == 0) return std::stod(line.substr(row.size() + 1));
+    ADD_FAILURE() << "no row " << row;
+    return 0;
+  }
+};
+
+TEST(LeeFrame, LimitLoadsAreSecondOrder) {
+  for (const int k : {0, 1}) {
+    const double exact = LeeFrame::reference(k == 0 ? "lin,limit1" : "lin,limit2");
+    std::array<double, 4> limit{};
+    for (int i = 0; i < 4; ++i) limit[i] = LeeFrame::load * LeeFrame{20 << i}.limits()[k].load_factor;
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(order(limit[i] - exact, limit[i + 1] - exact), 2, 0.03) << k << " at " << (20 << i); // 0.02 at 20 edges
+    EXPECT_NEAR((4 * limit[3] - limit[2]) / 3, exact, 1e-6 * std::abs(exact)) << k; // what is left of the fourth order and of the flat load there
+  }
+}
+
+/// Second order, 3.87/n^2; with `energy: seed` less by what the axial strain P/EA and the softness of the corner turn it, theta P/EA + theta^2 EI/(2 EA h L).
+TEST(LeeFrame, PassesTheLimitPointsAtAnyNumberOfEdges) {
+  const double exact = LeeFrame::reference("lin,limit1"), theta = pi / 2;
+  for (int edges = 20; edges <= 160; edges += 10)
+    for (const bool held : {true, false}) {
+      SCOPED_TRACE(testing::Message() << edges << " edges" << (held ? ", held in its plane" : ""));
+      const double limit = LeeFrame::load * LeeFrame{edges, Energy::classical, held}.limits()[0].load_factor;
+      EXPECT_NEAR(limit, exact, 4.0 / (edges * edges) * exact);
+      const LeeFrame seed{edges, Energy::seed, held};
+      const double less = limit - LeeFrame::load * seed.limits()[0].load_factor;
+      const double corner = dimensionlessGroups(seed.scene().rods[0], Vec3::Zero()).corner_softness;
+      EXPECT_NEAR(corner, theta * theta * 1440 / (2 * 4320 * (240.0 / edges) * 240), 1e-12);
+      EXPECT_GT(less, 0.5 * exact * (theta * limit / 4320 + corner));
+      EXPECT_LT(less, exact * (theta * limit / 4320 + corner));
+    }
+}
+
+/// So the corner of `seed` is one of stretch alone, and rods that hardly stretch do not see it.
+TEST(LeeFrame, CornersOfSeedOpenByStretch) {
+  std::array<double, 2> less{};
+  for (const int k : {0, 1}) {
+    const double stiff = k == 0 ? 4320 : 432000;
+    less[k] = LeeFrame{160, Energy::classical, true, stiff}.limits()[0].load_factor - LeeFrame{160, Energy::seed, true, stiff}.limits()[0].load_factor;
+  }
+  EXPECT_NEAR(less[0] / less[1], 100, 1); // linear in 1/EA, but for the square of 1e-3
+}
+
+TEST(LeeFrame, PathDoesNotDependOnPlaceAndDirection) {
+  const std::array<Vec3, 5> axes{Vec3(1, 2, 3), Vec3(-3, 1, 0.5), Vec3(0.2, -0.1, 2), Vec3(1, 1, 0), Vec3(0, 4, -1)}; // rotation vectors
+  for (const bool held : {true, false})
+    for (const int edges : {40, 80}) {
+      const LeeFrame frame{edges, Energy::classical, held};
+      const Path path = follow(frame.scene(), along(20, 200));
+      for (const Vec3 &axis : axes) {
+        SCOPED_TRACE(testing::Message() << edges << " edges, turned by " << axis.transpose() << (held ? ", held in its plane" : ""));
+        const Mat3 turn = Eigen::AngleAxisd(axis.norm(), axis.normalized()).toRotationMatrix();
+        const Vec3 place = 300 * Vec3(axis.z(), axis.x(), -axis.y());
+        const Path turned = follow(frame.scene(turn, place), along(20, 200));
+        ASSERT_EQ(turned.factor.size(), path.factor.size());
+        double apart = 0;
+        for (std::size_t k = 0; k < path.factor.size(); ++k) {
+          EXPECT_NEAR(turned.factor[k], path.factor[k], 1e-8);
+          for (std::size_t v = 0; v < path.states[k].position.size(); ++v)
+            apart = std::max(apart, (turn * path.states[k].position[v] + place - turned.states[k].position[v]).norm());
+        }
+        EXPECT_LT(apart, 1e-8 * 2 * LeeFrame::member);
+      }
+    }
+}
+
 /// A free ring of a naturally straight round rod with `turns` turns of twist: is the plane circle unstable? The polygon is in equilibrium by
 /// symmetry. A little mass (a step far longer than any period) lifts the seven motions that cost nothing above zero.
 bool ringIsUnstable(int edges, int turns, double torsional) {

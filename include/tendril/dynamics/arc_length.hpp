@@ -38,6 +38,7 @@ private:
   Configuration trial_;
   std::string failure_, obstacle_;
   int iterations_ = 0, negative_ = 0;
+  bool astray_ = false;   ///< the last step turned from its tangent, or from a stable branch to an unstable one
   double sharpness_ = 1;  ///< of -snes_rtol
   double left_ = 0;       ///< what Newton would still move the end of the last step by, in the positions and twists
   double load_reach_ = 0; ///< what the whole load would move them by at first, ...
@@ -56,10 +57,11 @@ private:
   PetscErrorCode correctAt(double factor, bool *converged);
   PetscErrorCode iterate(const std::function<double(const Point &moved, const Point &residual, const Point &load)> &constraint, double start, bool *converged);
   PetscErrorCode begin(const State &state, Point *direction);
+  PetscErrorCode refine(State &state, Point *direction, bool *refined);
   PetscErrorCode step(const State &state, double length, bool *converged, const Point *along = nullptr);
   PetscErrorCode locateLimit(const State &start, const Point &before, const std::array<double, 2> &slopes, double length, std::optional<CriticalPoint> *point);
-  PetscErrorCode locateBifurcation(const State &start, const Point &before, double length, std::optional<CriticalPoint> *point);
-  PetscErrorCode switchBranch(const State &critical, double length, double shortest, State *state, bool *switched);
+  PetscErrorCode locateBifurcation(const State &start, const State &end, const Point &before, double length, std::optional<CriticalPoint> *point);
+  PetscErrorCode switchBranch(const CriticalPoint &critical, double length, double shortest, State *state, bool *switched);
 };
 
 } // namespace tendril

@@ -13,6 +13,8 @@ struct CriticalPoint {
   double load_factor = 0;
   std::optional<State> state; ///< equilibrium there
   bool limit = false;         ///< the path turns back in the load there, instead of going on unstable
+  std::optional<State> lost;  ///< equilibrium a little away, on the side where more motions are unstable; no value at limit points
+  int stable_count = 0;       ///< of unstable motions on the other side
 };
 using CriticalObserver = std::function<PetscErrorCode(const CriticalPoint &)>;
 
@@ -25,6 +27,9 @@ struct BranchPoint {
 };
 /// Goes along a branch from a point of it to a value of its parameter, by plain Newton without escapes.
 using Follow = std::function<PetscErrorCode(const BranchPoint &from, double parameter, BranchPoint *to)>;
+
+/// The motion that becomes unstable at a critical point, at its state `lost`. The solver is left there. `found` is false where no motion is left to follow.
+PetscErrorCode criticalMode(StepSolver &solver, const CriticalPoint &point, Step step, Planes *mode, bool *found);
 
 /// Finds the critical point between `low` and the parameter `high` by bisection to 1e-9 of `scale`, and once more from points on either side of it, in
 /// other steps. `point` is the end of the interval towards `low`. `found` is false where there is none: nothing changes, Newton had gone over to

@@ -127,6 +127,10 @@ struct DimensionlessGroups {
   double axial_to_bending; ///< EA L^2 / EI
   double largest_turning;  ///< per vertex [deg]
   double largest_twist;    ///< per vertex, of the reference directors [deg]
+  /// With `energy: seed`, what stretch adds to the bending compliance L/EI at the corner (above 30 degrees) where that is most: a moment M stretches the
+  /// two edges by M theta/(2 EA h), by which a natural turning theta opens: theta^2 EI/(2 EA h L). It grows without end as the edges h get shorter.
+  double corner_softness;
+  int softest_corner; ///< that vertex
 };
 DimensionlessGroups dimensionlessGroups(const Rod &rod, const Vec3 &gravity);
 

@@ -98,8 +98,9 @@ public:
   /// Factors the Hessian at the iterate and counts negative pivots; -1 when it cannot be factored.
   /// \param lift of its eigenvalues, in units of the softest bending of each rod
   PetscErrorCode inertiaAtIterate(int *negative, double lift = 0);
-  /// The softest motion at the iterate, if it is softer [1/s^2] than `softest`. The edge that turns most turns by one radian.
-  PetscErrorCode softestMode(double *softest, Planes *mode);
+  /// The unstable motion at the iterate by whose loss the count of unstable motions falls to `stable`, if it takes a higher lift than `lift`, which then is
+  /// that lift. The edge that turns most turns by one radian. \see inertiaAtIterate
+  PetscErrorCode criticalMode(int stable, double *lift, Planes *mode);
   /// Solves with the matrix factored last.
   PetscErrorCode solveLinear(const Planes &right, Planes &solution);
 

@@ -31,8 +31,9 @@ public:
   /// Factors the Hessian at the iterate and counts negative pivots; -1 when it cannot be factored.
   /// \param lift of its eigenvalues, in units of the softest bending of each rod
   PetscErrorCode inertiaAtIterate(int *negative, double lift = 0);
-  /// The softest motion at the iterate; where the Hessian is nearly singular, the critical mode. The edge that turns most turns by one radian.
-  PetscErrorCode softestMode(Planes *mode);
+  /// The motion at the iterate without which no more than `stable` motions would be unstable with their eigenvalues lifted by `neutral`; `found` is false
+  /// where there is none. The edge that turns most turns by one radian.
+  PetscErrorCode criticalMode(int stable, double neutral, Planes *mode, bool *found);
 
   IncrementalPotential &potential() { return *potential_; }
   std::deque<NewtonSolver> &blocks() { return blocks_; }
