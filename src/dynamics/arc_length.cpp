@@ -1,5 +1,7 @@
 #include "tendril/dynamics/arc_length.hpp"
 
+#include "tendril/solver/activity.hpp"
+
 #include <algorithm>
 #include <petsctime.h>
 #include <sstream>
@@ -126,6 +128,15 @@ bool ArcLength::move(const Planes &increment, double factor) {
   potential.accept(trial_);
   potential.setLoadFactor(factor);
   return true;
+}
+
+/// The rod farthest from equilibrium at the iterate, in words.
+std::string ArcLength::imbalance() {
+  PetscReal rtol;
+  (void)SNESGetTolerances(solver_.snes(), nullptr, &rtol, nullptr, nullptr, nullptr);
+  IncrementalPotential &potential = solver_.potential();
+  const Asked asked{rtol * sharpness_, sharpness_};
+  return tellImbalance(potential, farthestRod(potential, potential.all(), asked), asked);
 }
 
 /// Newton on equilibrium and one constraint: two solves per factorisation, one for the residual and one for the load. The constraint gives the
@@ -267,6 +278,7 @@ PetscErrorCode ArcLength::locateLimit(const State &start, const Point &before, c
   PetscFunctionBeginUser;
   const Point after = std::exchange(last_, before);
   const int iterations = iterations_, negative = negative_;
+  const Doing here([](std::ostream &out) { out << "a limit point is searched for"; });
   const SharpTolerance sharp(solver_);
   std::array<double, 2> ends{0, length}, values = slopes;
   CriticalPoint point;
@@ -391,6 +403,10 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
   for (int taken = 0; taken < settings_.arclength_steps && state.time < settings_.t_end;) {
     const State start = state;
     const Point before_step = last_;
+    const Doing here([&](std::ostream &out) {
+      out << "step along the path at load factor " << start.time << ", length " << length;
+      if (rejected > 0) out << ", after " << rejected << " that failed";
+    });
     bool converged;
     PetscCall(step(state, length, &converged));
     const double slope = direction.factor;
@@ -421,7 +437,7 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     if (!little) {
       std::ostringstream message;
       message << "step along the path at load factor " << state.time << " is lost in rounding: Newton would still move it by " << left_
-              << " of the length, it moves " << size(last_) << " (-rounding_tolerance " << potential.rounding_tolerance << "); use fewer edges";
+              << " of the length, it moves " << size(last_) << " (-rounding_tolerance " << potential.rounding_tolerance << "); use fewer edges" << imbalance();
       failure_ = message.str();
       PetscFunctionReturn(0);
     }
@@ -440,7 +456,7 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
       if (length >= shortest) continue;
       std::ostringstream message;
       message << "step along the path at load factor " << state.time << " failed with length " << 2 * length << " after " << iterations_
-              << " iterations: " << obstacle_;
+              << (iterations_ == 1 ? " iteration: " : " iterations: ") << obstacle_ << (astray_ ? "" : imbalance());
       failure_ = message.str();
       PetscFunctionReturn(0);
     }

@@ -1,5 +1,7 @@
 #include "tendril/dynamics/bifurcation.hpp"
 
+#include "tendril/solver/activity.hpp"
+
 #include <algorithm>
 
 namespace tendril {
@@ -81,6 +83,7 @@ PetscErrorCode locateCritical(const Follow &follow, BranchPoint low, double high
   constexpr double interval = 1e-9, agreement = 1e-7, part = 1e-3; // of the scale, of the load factor, of the first interval
   PetscFunctionBeginUser;
   *found = false;
+  const Doing here([](std::ostream &out) { out << "a critical load is searched for"; });
   const double end = high, aside = std::max(part * (high - low.parameter), 1e-5 * scale);
   double last = std::nan(""); // what the round before found
   bool ahead = false;         // whether the branch was found beyond

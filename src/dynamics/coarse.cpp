@@ -2,6 +2,7 @@
 
 #include "tendril/dynamics/simulation.hpp"
 #include "tendril/model/redraw.hpp"
+#include "tendril/solver/activity.hpp"
 
 #include <algorithm>
 
@@ -178,6 +179,7 @@ PetscErrorCode solveCoarse(const IncrementalPotential &fine, const State &start,
   *report = {};
   Coarse coarse(fine, rods);
   if (!coarse.worth) PetscFunctionReturn(0);
+  const Doing here([&](std::ostream &out) { out << "with fewer edges, " << coarse.scene.rods[0].edges() << " of rod '" << coarse.scene.rods[0].name << "'"; });
   LoopSettings settings;
   settings.dynamic = false;
   settings.retraction = fine.retraction;

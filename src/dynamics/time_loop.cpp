@@ -1,5 +1,7 @@
 #include "tendril/dynamics/time_loop.hpp"
 
+#include "tendril/solver/activity.hpp"
+
 #include <algorithm>
 #include <petsctime.h>
 #include <sstream>
@@ -270,6 +272,11 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     const double h = nextStep(state.time, &landing);
     Step step = stepOf(settings_, state, h);
     if (std::abs(step.time - landing) < 1e-9 * h) step.time = landing;
+    const Doing here([&](std::ostream &out) {
+      out << (settings_.dynamic ? "step at time " : "load step at factor ") << state.time << " of " << settings_.t_end
+          << (settings_.dynamic ? ", dt " : ", increment ") << h;
+      if (rejected > 0) out << ", after " << rejected << " that failed";
+    });
     NewtonReport report;
     energy = {};
     auto addEnergy = [&](const State &end, int r) {
@@ -339,8 +346,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
       if (!report.lost && dt >= std::min(dt_min, (settings_.t_end - state.time) / 1024)) continue; // a short last step may be halved as often
       std::ostringstream message;
       message << (settings_.dynamic ? "step at time " : "load step at factor ") << state.time << " failed with " << (settings_.dynamic ? "dt " : "increment ")
-              << h << ": " << report.reason << " (" << report.iterations << " iterations; residual " << report.residual.force << " of the load, "
-              << report.residual.moment << " of its moment, where -snes_rtol is asked for)";
+              << h << ": " << report.reason << " (" << report.iterations << " iterations)";
       failure_ = message.str();
       PetscFunctionReturn(0);
     }

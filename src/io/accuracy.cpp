@@ -1,6 +1,7 @@
 #include "tendril/io/accuracy.hpp"
 
 #include "tendril/model/alike.hpp"
+#include "tendril/solver/activity.hpp"
 
 #include <algorithm>
 #include <iomanip>
@@ -126,6 +127,7 @@ PetscErrorCode chooseEdges(const Scene &scene, const std::vector<Drawing> &drawi
     if (*std::max_element(edges.begin(), edges.end()) > most_edges)
       throw SceneError(asked + " needs more than " + shortText(most_edges) + " edges a rod, which rounding forbids; write a larger tolerance");
     Round found;
+    const Doing here([&](std::ostream &out) { out << "accuracy, with " << edges[0] << " edges of rod '" << scene.rods[0].name << "'"; });
     PetscCall(estimateAt(scene, drawings, settings, edges, accuracy.of, &found));
     double worst = 0;
     std::size_t where = 0;

@@ -1,4 +1,5 @@
 #include "tendril/io/samples.hpp"
+#include "tendril/solver/activity.hpp"
 
 #include <algorithm>
 #include <limits>
@@ -202,6 +203,10 @@ private:
     const auto [place, is_new] = runs_.try_emplace(resolution);
     if (is_new) {
       LoopSettings s = settingsAt(resolution.steps);
+      const Doing here([&](std::ostream &out) {
+        out << "accuracy, run " << probes_ + 1 << " with " << resolution.edges[0] << " edges of rod '" << scene_.rods[0].name << "' and "
+            << stepText(resolution.steps);
+      });
       if (!adapts_ && s.dt_min == 0) s.dt_min = s.dt / 16; // where shorter ones are needed, all should be
       PetscCall(sample(redraw(scene_, drawings_, resolution.edges), s, times_, &place->second));
       count(place->second);

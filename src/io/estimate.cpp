@@ -1,6 +1,7 @@
 #include "tendril/io/estimate.hpp"
 
 #include "tendril/dynamics/prolong.hpp"
+#include "tendril/solver/activity.hpp"
 
 #include <algorithm>
 #include <iomanip>
@@ -87,6 +88,7 @@ PetscErrorCode estimateError(const Simulation &run, double rounding_error, const
   PetscFunctionBeginUser;
   const Answer coarse = answerOf(run, rounding_error, critical);
   Answer fine;
+  const Doing here([](std::ostream &out) { out << "error estimate, with half the edges' lengths"; });
   estimate->none = "the run ended before its full load";
   if (coarse.load_factor == settings.t_end) {
     PetscCall(solveFrom(run, scene, settings, &fine));

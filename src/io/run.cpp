@@ -13,6 +13,7 @@
 #include "tendril/io/stop.hpp"
 #include "tendril/io/summary.hpp"
 #include "tendril/io/text.hpp"
+#include "tendril/solver/activity.hpp"
 #include "tendril/solver/events.hpp"
 
 #include <algorithm>
@@ -166,9 +167,13 @@ PetscErrorCode setUp(Prepared &prepared, Options &o) {
 /// Chooses the edges, and in dynamics the steps, and makes the scene ready to run with them.
 PetscErrorCode meetAccuracy(Prepared &prepared, Options &o, Choice *choice) {
   PetscFunctionBeginUser;
-  choice->tell = [](const std::string &line) {
-    std::printf("%s\n", line.c_str());
+  watch().tell = [](const std::string &line) {
+    std::printf("%s\n", printable(line).c_str());
     std::fflush(stdout);
+  };
+  choice->tell = [](const std::string &line) {
+    watch().tell(line);
+    watch().restart();
   };
   PetscCall(chooseResolution(prepared.written, prepared.drawings, o.loop, *o.accuracy, choice));
   o.loop = choice->loop;
@@ -265,6 +270,20 @@ bool takeUp(const Options &o, const OutputFolder &folder, const RunFacts &facts,
   return true;
 }
 
+/// The rod of the largest kinetic energy.
+std::size_t liveliest(const Simulation &run) {
+  std::size_t most = 0;
+  double largest = -1;
+  for (std::size_t r = 0; r < run.elements->rods.size(); ++r) {
+    const RodRange &rod = run.elements->rods[r];
+    double energy = 0;
+    for (int i = 0; i < rod.vertices; ++i)
+      energy += 0.5 * run.elements->mass()[rod.slot(i)] * run.state.velocity[std::size_t(rod.first_vertex + i)].squaredNorm();
+    if (energy > largest) largest = energy, most = r;
+  }
+  return most;
+}
+
 PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequest::Clock::time_point begin, int *exit_code) {
   PetscFunctionBeginUser;
   Options o;
@@ -306,7 +325,7 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   Provenance origin = provenance(argc, argv);
   origin.scene = std::move(prepared.source);
   origin.effective_options = writeOptionsFile(o.output_dir + "/options.yaml", o, origin, run.scene);
-  Progress progress(o.loop.t_end, o.output_dir + "/log.txt");
+  Progress progress(o.loop, o.output_dir + "/log.txt");
   progress.say(origin.command_line);
   for (const std::string &line : told) progress.say(line);
   std::istringstream groups(groupsText(run.scene));
@@ -416,14 +435,16 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
           << "), " << rejected << " rejected, " << last.wall_seconds << " s, results in " << o.output_dir;
   progress.say(summary.str());
   for (const std::string &line : describe(at_end, run.scene)) progress.say(line);
+  constexpr double most_gained = 0.5; // of what the motion's own energy and the work of loads and supports come to
   const double moved = most_kinetic + work;
   if (o.loop.dynamic && gained > 0.1 * moved + little) {
     std::ostringstream growth;
     growth << "the energy rose by " << std::setprecision(2) << gained / moved << " of the largest kinetic energy"
-           << (work > 0 ? " and the work of loads and supports" : "") << ", with nothing to put it in but -integrator " << o.loop.integrator.name
-           << " in steps too long for it: shorten -dt, or take bdf2 or energy_momentum";
+           << (work > 0 ? " and the work of loads and supports" : "") << " (at most " << most_gained << " passes), with nothing to put it in but -integrator "
+           << o.loop.integrator.name << " in steps too long for it: shorten -dt, or take bdf2 or energy_momentum; " << labelOf(run.scene.rods[liveliest(run)])
+           << " moves most";
     // A method that is unstable has made most of the motion itself.
-    if (finished && gained > 0.5 * moved + little) {
+    if (finished && gained > most_gained * moved + little) {
       finished = false;
       failure = growth.str();
     } else
@@ -451,8 +472,7 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
     progress.say(line.str());
     *exit_code = request.exitCode();
   } else if (!finished) {
-    progress.say("failed: " + failure);
-    std::fprintf(stderr, "tendril: %s\n", printable(failure).c_str());
+    progress.fail(failure);
     *exit_code = 2;
   }
   writer.reset();

@@ -1,5 +1,6 @@
 #include "tendril/solver/newton.hpp"
 
+#include "tendril/solver/activity.hpp"
 #include "tendril/solver/banded.hpp"
 #include "tendril/solver/events.hpp"
 
@@ -10,6 +11,7 @@
 #include <cmath>
 #include <iomanip>
 #include <sstream>
+#include <utility>
 
 namespace tendril {
 namespace {
@@ -316,6 +318,7 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
     worst.include(residual);
   }
   report_.history.push_back(worst.force);
+  watch().beat();
   *reason = SNES_CONVERGED_ITERATING;
   if (!finite)
     *reason = SNES_DIVERGED_FNORM_NAN;
@@ -638,6 +641,7 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
 PetscErrorCode NewtonSolver::inertiaAtIterate(int *negative, double lift) {
   bool regular;
   PetscFunctionBeginUser;
+  watch().beat();
   focus();
   fill(work_->wanted, true);
   age_ = 0;
@@ -657,12 +661,19 @@ void NewtonSolver::focus() {
 
 /// The rod that is farthest from its equilibrium, in words.
 std::string NewtonSolver::farthest() {
-  int worst = rods_.begin;
+  const int rod = farthestRod(*potential_, rods_, asked(), &work_->wanted);
+  if (rod >= 0 && isAtNoise(work_->residual[rod], 0)) return "; " + roundingMessage(rod, sizeOf(rod, work_->increment));
+  return tellImbalance(*potential_, rod, asked());
+}
+
+/// The first rod that is unstable in the Hessian factored last, in words, where that tells them apart.
+std::string NewtonSolver::unstableRod() const {
+  if (!banded_ && !inertia_ && rods_.end - rods_.begin > 1) return "";
   for (int r = rods_.begin; r < rods_.end; ++r)
-    if (work_->wanted[r] && !(excess(work_->residual[r], rtol_) <= excess(work_->residual[worst], rtol_))) worst = r;
-  if (isAtNoise(work_->residual[worst], 0)) return "; " + roundingMessage(worst, sizeOf(worst, work_->increment));
-  const Rod &rod = potential_->scene().rods[worst];
-  return "; rod '" + rod.name + "' of " + std::to_string(rod.edges()) + " edges is farthest from its equilibrium";
+    if (const int count = work_->negative[r]; count > 0)
+      return "; " + labelOf(potential_->scene().rods[r]) + ": forces and moments are in balance, and " + std::to_string(count) +
+             (count == 1 ? " motion lowers" : " motions lower") + " its energy";
+  return "";
 }
 
 /// SNES from the potential's iterate. `failure` is empty when it converged.
@@ -677,7 +688,7 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
   PetscCall(writeIterate(x_));
   spent_ = report_.iterations;
   PetscCall(SNESSolve(snes_, nullptr, x_));
-  report_.iterations += spent_;
+  report_.iterations += std::exchange(spent_, 0);
   PetscCall(SNESGetConvergedReason(snes_, &reason));
   failure->clear();
   if (reason > 0 || creeps_) PetscFunctionReturn(0); // a saddle nearby is left as one that was reached
@@ -688,7 +699,6 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
     switch (reason) {
     case SNES_DIVERGED_MAX_IT:
       *failure = "the iteration limit (-snes_max_it) was reached";
-      *failure += farthest();
       break;
     case SNES_DIVERGED_LINE_SEARCH:
       *failure = "no step along the search direction lowers the energy";
@@ -703,6 +713,7 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
     default:
       *failure = SNESConvergedReasons[reason];
     }
+  if (!report_.lost) *failure += farthest();
   PetscFunctionReturn(0);
 }
 
@@ -797,7 +808,11 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
   seek_ = seek;
   patience_ = patience;
   sharpness_ = 1;
-  likely_ = 0;
+  likely_ = spent_ = 0;
+  const Doing here([this](std::ostream &out) {
+    out << "Newton iteration " << spent_ + report_.iterations;
+    if (rtol_ > 0) out << ", out of balance by " << excess(report_.residual, rtol_) << " times what is asked for";
+  });
   fill(work_->last_shift, 0.0); // a step depends on its start alone
   for (int r = rods_.begin; r < rods_.end; ++r) potential_->beginRod(start, r);
   forgetEnergies();
@@ -840,6 +855,7 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
       continue;
     }
     bool left = false, neutral = false;
+    const std::string unstable = unstableRod();
     if (negative > 0 && k < 10) PetscCall(escapeSaddle(&left, &neutral));
     if (neutral && !left) { // no way down, but what loads move along it has to be found
       PetscCall(inertiaAtIterate(&negative));
@@ -851,7 +867,8 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
     }
     seek_ = seek;
     if (!left) {
-      failure = negative < 0 ? "the Hessian cannot be factored" : "the equilibrium is unstable (negative pivots) and no way down from it was found";
+      failure = negative < 0 ? "the Hessian cannot be factored" + tellImbalance(*potential_, farthestRod(*potential_, rods_, asked()), asked())
+                             : "the equilibrium is unstable (negative pivots) and no way down from it was found" + unstable;
       break;
     }
     sharpness_ *= 1e-2; // close to a branching the forces are small far from the equilibrium

@@ -1,4 +1,5 @@
 /// Indefinite Hessians: descent directions from shifted ones, and the ways out of saddles.
+#include "tendril/solver/activity.hpp"
 #include "tendril/solver/newton.hpp"
 
 #include <algorithm>
@@ -182,6 +183,7 @@ PetscErrorCode NewtonSolver::criticalMode(int stable, double *lift, Planes *mode
   beginMode();
   normaliseMode();
   for (int k = 0; k < iterations; ++k) {
+    watch().beat();
     Planes right = potential_->dofs().makePlanes();
     for (int r = rods_.begin; r < rods_.end; ++r) {
       const RodRange &rod = potential_->elements().rods[r];
@@ -269,6 +271,7 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
     std::vector<double> before(neutral->size(), HUGE_VAL);
     bool settled = false; // what more iterations would not change
     for (int k = 0; k < 100 && !settled; ++k) {
+      watch().beat();
       PetscCall(solveLinear(right, work_->increment));
       const Planes soft = soften();
       done = settled = true;
@@ -297,6 +300,7 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
 PetscErrorCode NewtonSolver::escapeSaddle(bool *left, bool *neutral) {
   PetscFunctionBeginUser;
   *left = false;
+  const Doing here([](std::ostream &out) { out << "a way down from an unstable equilibrium is looked for"; });
   std::vector<char> found, neutral_rods;
   const std::vector<int> negative = work_->negative;
   PetscCall(findBucklingModes(&found, &neutral_rods));

@@ -13,8 +13,7 @@ namespace tendril {
 namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
-constexpr double compatibility_rtol = 1e-4; ///< of the axial forces' strain errors, against that of forces
-constexpr int patience = 3;                 ///< iterations without a fall of the residual
+constexpr int patience = 3; ///< iterations without a fall of the residual
 
 } // namespace
 
@@ -164,9 +163,10 @@ std::string NewtonSolver::roundingMessage(int r, double size) const {
   const auto [k1, k2] = rod.material.flexural_stiffness;
   const double slenderness = std::min(k1, k2) > 0 ? rod.material.axial_stiffness * length * length / std::min(k1, k2) : 0;
   std::ostringstream text;
-  text << std::setprecision(3) << "rod '" << rod.name << "' is lost in rounding: Newton would still move it by " << size
-       << " of its length, the step moves it by " << movedBy(r) << " (-rounding_tolerance " << potential_->rounding_tolerance
-       << "), and the residual does not fall any more";
+  const std::string imbalance = imbalanceOf(*potential_, r, asked());
+  text << std::setprecision(3) << "rod '" << rod.name << "' is lost in rounding: " << imbalance << (imbalance.empty() ? "" : ", and not falling any more; ")
+       << "Newton would still move it by " << size << " of its length, the step moves it by " << movedBy(r) << " (-rounding_tolerance "
+       << potential_->rounding_tolerance << ")";
   if (longest > 100 * shortest)
     text << "; edge " << edge << " is " << shortest << " m long, the longest " << longest
          << " m: take one of its vertices away, or use edges of more even length";

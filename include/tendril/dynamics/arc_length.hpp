@@ -48,6 +48,7 @@ private:
   double size(const Point &p) const;
   double allowance(const Point &moved) const;
   PetscErrorCode verify(const Point &direction, bool *little);
+  std::string imbalance();
   PetscErrorCode findStart(State &state);
   PetscErrorCode tangent(Point *direction);
   PetscErrorCode solve(const Planes &gradient, Planes *step);

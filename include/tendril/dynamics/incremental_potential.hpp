@@ -101,6 +101,10 @@ public:
   Residual residual(int rod, const RodEnergy &energy);
   /// The largest of each over all rods.
   Residual residual();
+  /// What forces of a rod are measured by [N], and moments by that times its length: its loads, or where it `hasLoad` not, what deforms it.
+  double forceScale(int rod) const { return force_scale_[rod]; }
+  bool hasLoad(int rod) const { return load_[rod] > 0; }
+  const AxialLaw &axial() const { return axial_; }
 
   /// Displacements of the iterate since the step began, and the rates that follow from them by a rule.
   StageRates stageRates(const StageRule &rule) const;

@@ -5,6 +5,7 @@
 #include "tendril/dynamics/incremental_potential.hpp"
 #include "tendril/solver/banded.hpp"
 #include "tendril/solver/circulatory.hpp"
+#include "tendril/solver/imbalance.hpp"
 
 #include <optional>
 #include <string>
@@ -173,7 +174,9 @@ private:
   bool isBalanced(int rod, double rtol) const;
   PetscErrorCode findLoadReach();
   PetscErrorCode verify(bool *little);
+  Asked asked() const { return {rtol_, sharpness_}; }
   std::string farthest();
+  std::string unstableRod() const;
   std::string roundingMessage(int rod, double size) const;
   void beginMode();
   double massOf(int r) const;
