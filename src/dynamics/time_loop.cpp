@@ -346,7 +346,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
       if (!report.lost && dt >= std::min(dt_min, (settings_.t_end - state.time) / 1024)) continue; // a short last step may be halved as often
       std::ostringstream message;
       message << (settings_.dynamic ? "step at time " : "load step at factor ") << state.time << " failed with " << (settings_.dynamic ? "dt " : "increment ")
-              << h << ": " << report.reason << " (" << report.iterations << " iterations)";
+              << h << ": " << report.reason << " (" << report.iterations << (report.iterations == 1 ? " iteration)" : " iterations)");
       failure_ = message.str();
       PetscFunctionReturn(0);
     }

@@ -527,6 +527,7 @@ int runMain(int count, char **arguments) {
   signals.restore();
   int exit_code = 0;
   try {
+    const QuietErrors errors;
     const PetscErrorCode error = [&]() -> PetscErrorCode {
       PetscFunctionBeginUser;
       PetscCall(registerEvents());
@@ -534,7 +535,7 @@ int runMain(int count, char **arguments) {
       PetscCall(execute(argc, argv, files, begin, &exit_code));
       PetscFunctionReturn(0);
     }();
-    if (error) exit_code = 1;
+    if (error) throw SceneError("solving: " + errors.message());
   } catch (const std::exception &e) {
     int rank;
     MPI_Comm_rank(PETSC_COMM_WORLD, &rank);

@@ -662,7 +662,7 @@ void NewtonSolver::focus() {
 /// The rod that is farthest from its equilibrium, in words.
 std::string NewtonSolver::farthest() {
   const int rod = farthestRod(*potential_, rods_, asked(), &work_->wanted);
-  if (rod >= 0 && isAtNoise(work_->residual[rod], 0)) return "; " + roundingMessage(rod, sizeOf(rod, work_->increment));
+  if (rod >= 0 && isAtNoise(potential_->residual(rod, energyAtIterate(rod)), 0)) return "; " + roundingMessage(rod, sizeOf(rod, work_->increment));
   return tellImbalance(*potential_, rod, asked());
 }
 
@@ -680,6 +680,8 @@ std::string NewtonSolver::unstableRod() const {
 PetscErrorCode NewtonSolver::newton(std::string *failure) {
   SNESConvergedReason reason;
   PetscFunctionBeginUser;
+  PetscCall(SNESGetTolerances(snes_, nullptr, &rtol_, nullptr, nullptr, nullptr));
+  rtol_ *= sharpness_;
   fill(work_->wanted, true);
   fill(work_->standstill, Standstill());
   fill(work_->load_reach, std::nan(""));
@@ -721,21 +723,28 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
 std::string NewtonSolver::nearBarrier() const {
   const Elements &e = potential_->elements();
   const Configuration &c = potential_->iterate();
-  double twist = 0, turning = 0;
+  struct Worst {
+    double angle = 0;
+    int rod = 0;
+    void include(double other, int r) {
+      if (other > angle) angle = other, rod = r;
+    }
+  } twist, turning;
   for (int r = rods_.begin; r < rods_.end; ++r)
     forCells(e, r, [&]<class T>(const LooseCell &cell, int count) {
       for (int l = 0; l < count; ++l) {
-        if (e.measure[r] == Measure::tan) twist = std::max(twist, std::abs(c[Configuration::twist][cell.slot + l]));
-        turning = std::max(turning, std::acos(std::clamp(c.frameAt(cell.frame0 + l).tangent.dot(c.frameAt(cell.frame1 + l).tangent), -1.0, 1.0)));
+        if (e.measure[r] == Measure::tan) twist.include(std::abs(c[Configuration::twist][cell.slot + l]), r);
+        turning.include(std::acos(std::clamp(c.frameAt(cell.frame0 + l).tangent.dot(c.frameAt(cell.frame1 + l).tangent), -1.0, 1.0)), r);
       }
     });
   constexpr double near = 150, degrees = 180 / pi;
   std::string hint;
-  if (twist * degrees > near)
-    hint += "; neighbouring edges are twisted by " + std::to_string(int(twist * degrees)) +
+  auto told = [&](const Worst &worst) { return "; neighbouring edges of " + labelOf(potential_->scene().rods[worst.rod]) + " are "; };
+  if (twist.angle * degrees > near)
+    hint += told(twist) + "twisted by " + std::to_string(int(twist.angle * degrees)) +
             " degrees, and measure tan has a barrier at 180: use more edges, or measure: angle";
-  if (turning * degrees > near)
-    hint += "; neighbouring edges are folded by " + std::to_string(int(turning * degrees)) + " degrees of at most 180: use more edges";
+  if (turning.angle * degrees > near)
+    hint += told(turning) + "folded by " + std::to_string(int(turning.angle * degrees)) + " degrees of at most 180: use more edges";
   return hint;
 }
 

@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """What the command line understands, and what a run tells of its input: command_line.py <tendril>."""
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -165,6 +166,41 @@ def summarises(folder):
     assert s["largest_tension"] < 1e-12 and s["largest_angle_rod"] == -1 and "reaction" not in s, s  # rounding of 9.81 N
 
 
-for test in (commands, redraws, joins, warns, summarises):
+def fails(folder):
+    """Why a step failed: once, on the standard error and in the log, with what is out of balance; and nothing of a run that is fast."""
+    told, _, _ = run(folder, LINE)
+    assert "\nload factor 1 of 1  increment " in told and "time" not in told.split("\nload factor")[1] and "working for" not in told, told
+    told, _, _ = run(folder, CABLE)
+    assert "\ntime 0.1 of 0.4  dt 0.02  its " in told and "load factor" not in told and "working for" not in told, told
+    command = [program, "-scene", "scene.yaml", "-snes_max_it", "1"]
+    with open(f"{folder}/scene.yaml", "w") as f:
+        f.write(LINE)
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 2 and "failed" not in done.stdout and done.stderr.count("\n") == 1, done
+    balance = r"; rod 'b' \(8 edges\): forces out of balance by ([0-9.e-]+) of its load of ([0-9.]+) N \(asked: 1e-06, -snes_rtol\), most at vertex \d"
+    found = re.match(r"tendril: load step at factor 0 failed with increment [0-9.e-]+: the iteration limit \(-snes_max_it\) was reached" + balance, done.stderr)
+    assert found and float(found[1]) > 1e-6, done.stderr
+    load = 9.81 * np.pi * 1e-4 * 1000  # the weight of the rod
+    assert abs(float(found[2]) - load) < 1e-3, (found[2], load)
+    with open(f"{folder}/out/log.txt") as f:
+        assert f.read().endswith("failed: " + done.stderr[len("tendril: ") :])
+    # All of it on one terminal.
+    inside, outside = os.openpty()
+    terminal = subprocess.Popen(command, cwd=folder, stdout=outside, stderr=outside)
+    os.close(outside)
+    told = b""
+    try:
+        while piece := os.read(inside, 4096):
+            told += piece
+    except OSError:  # the end of a terminal
+        pass
+    os.close(inside)
+    assert terminal.wait() == 2 and told.count(b"failed") == 1 and told.count(b"out of balance") == 1, told
+    # What PETSc only finds out when it solves.
+    done = subprocess.run([program, "-scene", "scene.yaml", "-pc_type", "shell"], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 1 and done.stderr.startswith("tendril: option -pc_type: solving: ") and done.stderr.count("\n") == 1, done
+
+
+for test in (commands, redraws, joins, warns, summarises, fails):
     with tempfile.TemporaryDirectory() as place:
         test(place)

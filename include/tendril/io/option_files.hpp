@@ -16,14 +16,16 @@ public:
   void read(int argc, char **argv);
   /// "file:line" of an option, without its dash; empty where the command line gives it, or nothing does.
   std::string place(const std::string &option) const;
-  /// The message with the place of the option that it begins with. PETSc's name no option: they get the files.
+  /// The message with the place of the option that it begins with. PETSc's name no option: they get those whose value they tell, or the files.
   std::string locate(const std::string &message) const;
 
 private:
   std::vector<std::string> files_;
   std::map<std::string, std::string> places_;
+  std::map<std::string, std::string> values_; ///< of all options, wherever they stand
   void readYaml(const std::string &file);
   void readPlain(const std::string &file);
+  std::string toldIn(const std::string &message) const;
 };
 
 } // namespace tendril
