@@ -748,13 +748,12 @@ std::string NewtonSolver::nearBarrier() const {
   return hint;
 }
 
-/// A hint for failures of steps at whose start a rod of the energy `seed` bends about as sharply as it can: without axial force its stretch r obeys
-/// r^2 = 1 - 2 B kappa^2/EA, with kappa the turning per reference length, and the moment B r^2 kappa is largest where B kappa^2 = EA/6.
-std::string NewtonSolver::nearMomentLimit() const {
+/// Words on the rod of the energy `seed` that bends most sharply, more than `sharpest`, with its edges shorter than `longest`: without axial force its
+/// stretch r obeys r^2 = 1 - 2 B kappa^2/EA, with kappa the turning per reference length, and the moment B r^2 kappa is largest where B kappa^2 = EA/6,
+/// the unit of the sharpness, and r^2 = 2/3. Empty where none does.
+std::string NewtonSolver::sharpestBend(const Configuration &c, double sharpest, double longest) const {
   const Elements &e = potential_->elements();
-  const Configuration &c = potential_->start();
   constexpr double near = 0.88; // of the limit; where it is passed the moment falls again
-  double sharpest = 0.5;        // of 6 B kappa^2/EA: at `near`
   std::ostringstream hint;
   for (int r = rods_.begin; r < rods_.end; ++r) {
     const Rod &rod = potential_->scene().rods[r];
@@ -768,7 +767,7 @@ std::string NewtonSolver::nearMomentLimit() const {
         const Eigen::Vector2d strain(s[0] - k.rest[0], s[1] - k.rest[1]), force(k.stiffness[0] * strain[0], k.stiffness[1] * strain[1]);
         const double bending = force.squaredNorm() / force.dot(strain) * e.cellLength()[cell.slot]; // B about the axis of bending
         const double sharpness = 6 * force.squaredNorm() / (bending * stretch * stretch * rod.material.axial_stiffness);
-        if (!(sharpness > sharpest)) continue;
+        if (!(sharpness > sharpest && stretch < longest)) continue;
         sharpest = sharpness;
         const double moment = stretch * force.norm(), limit = 2.0 / 3 * std::sqrt(rod.material.axial_stiffness * bending / 6);
         hint.str("");
@@ -780,6 +779,26 @@ std::string NewtonSolver::nearMomentLimit() const {
     });
   }
   return hint.str();
+}
+
+/// Words on a rod of the energy `seed` that is near a limit of its law, or beyond: of bending, as sharpestBend, or of compression with an edge shorter than
+/// `shortest`; the force is largest, EA r (1 - r^2)/2 = 0.192 EA, where the stretch r obeys r^2 = 1/3.
+std::string NewtonSolver::limitOfLaw(const Configuration &c, double sharpest, double longest, double shortest) const {
+  std::string bent = sharpestBend(c, sharpest, longest);
+  if (!bent.empty()) return bent;
+  const Elements &e = potential_->elements();
+  std::ostringstream words;
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    const Rod &rod = potential_->scene().rods[r];
+    double stretch = shortest;
+    for (int s = e.rods[r].first_slot; s < e.rods[r].edgeEnd(); ++s) stretch = std::min(stretch, c[Configuration::length][s] * e.inverseRestLength()[s]);
+    if (rod.energy != Energy::seed || stretch == shortest) continue;
+    words << std::setprecision(4) << "; an edge of rod '" << rod.name << "' is down to " << stretch
+          << " of its length, and its 'energy: seed' bears at most 0.192 EA = " << rod.material.axial_stiffness / (3 * std::sqrt(3.0))
+          << " N of compression; 'energy: classical' has no limit";
+    break;
+  }
+  return words.str();
 }
 
 /// Starts every rod from where its velocities lead when that is lower than the start.
@@ -838,6 +857,7 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
   // In statics the answer must be a minimum, and the Hessian there says how far from it the iterate still is.
   int rounds = 0;
   bool settled = false;
+  std::string beyond; // the limit of a law
   // Whether what is left is little; else Newton goes on to a sharper tolerance, `along` as it seeks.
   auto settle = [&](Seek along) {
     PetscFunctionBeginUser;
@@ -859,6 +879,11 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
     report_.negative_pivots = negative;
     if (k == 0) report_.first_negative_pivots = negative;
     if (seek == Seek::equilibrium && negative >= 0) break;
+    if (negative > 0) beyond = limitOfLaw(potential_->iterate(), 1, std::sqrt(2.0 / 3), std::sqrt(1.0 / 3)); // where an edge gives way, the load falls
+    if (!beyond.empty()) {
+      failure = "the equilibrium is unstable" + beyond;
+      break;
+    }
     if (negative == 0 || (negative > 0 && !potential_->scene().moments.empty())) { // couples: no minimum to speak of
       PetscCall(settle(seek_));
       continue;
@@ -885,7 +910,10 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
   }
   report_.converged = failure.empty();
   for (int r = rods_.begin; r < rods_.end; ++r) report_.rounding_error = std::max(report_.rounding_error, work_->left[r]);
-  report_.reason = report_.converged ? "converged" : failure + nearBarrier() + nearMomentLimit();
+  report_.reason =
+      report_.converged
+          ? "converged"
+          : failure + nearBarrier() + (beyond.empty() ? limitOfLaw(potential_->start(), 0.5, HUGE_VAL, 0.65) : ""); // 0.88 of the moment, 0.98 of the force
   *report = report_;
   PetscFunctionReturn(0);
 }

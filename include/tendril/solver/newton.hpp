@@ -193,7 +193,8 @@ private:
     std::fill(values.begin() + rods_.begin, values.begin() + rods_.end, value);
   }
   std::string nearBarrier() const;
-  std::string nearMomentLimit() const;
+  std::string sharpestBend(const Configuration &c, double sharpest, double longest) const;
+  std::string limitOfLaw(const Configuration &c, double sharpest, double longest, double shortest) const;
 };
 
 /// Registers the line search type `retraction` and the factorisation `banded`; call after PetscInitialize.
