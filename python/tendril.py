@@ -39,6 +39,13 @@ FORMAT_1_UNITS = {
 }
 
 
+def parts(folder):
+    """Folders of a run that `-restart auto` went on with, in order of time; the last is `folder` itself. The first frame
+    of each is the state in which the one before was left off, whose later frames it replaces."""
+    found = [d.name for d in os.scandir(folder) if d.is_dir() and re.fullmatch(r"part_[1-9][0-9]*", d.name)]
+    return [os.path.join(folder, name) for name in sorted(found, key=lambda name: int(name[5:]))] + [folder]
+
+
 class TendrilError(ValueError):
     """What is wrong with a file, or with what was asked of it, in one line."""
 
