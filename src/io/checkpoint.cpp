@@ -65,7 +65,7 @@ std::string textOf(const Material &m) {
 }
 
 std::string textOf(const Support &support) {
-  std::string text = support.kind == Support::Kind::clamp ? "clamp" : support.kind == Support::Kind::pin ? "pin" : "fix_twist";
+  std::string text = nameOf(support.kind);
   if (support.holdsTwist()) text += " of tangent " + textOf(support.frame.tangent) + " and director " + textOf(support.frame.director);
   const Motion &m = support.motion;
   if (m.table.empty()) return m.moves() ? text + ", velocity " + textOf(m.velocity) + ", angular velocity " + textOf(m.angular_velocity) : text;

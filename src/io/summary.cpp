@@ -19,8 +19,6 @@ std::string textOf(const Vec3 &x, const char *unit) {
   return out.str();
 }
 
-const char *nameOf(Support::Kind kind) { return kind == Support::Kind::clamp ? "clamp" : kind == Support::Kind::pin ? "pin" : "fix_twist"; }
-
 } // namespace
 
 Summary summarize(const Scene &scene, const Elements &elements, const State &state, double load_factor) {

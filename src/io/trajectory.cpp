@@ -74,18 +74,6 @@ const char *nameOf(SectionShape shape) {
   return "none";
 }
 
-const char *nameOf(Support::Kind kind) {
-  switch (kind) {
-  case Support::Kind::clamp:
-    return "clamp";
-  case Support::Kind::pin:
-    return "pin";
-  case Support::Kind::fix_twist:
-    return "fix_twist";
-  }
-  return "";
-}
-
 /// Radius of a tube that stands for a rod: the mean of the half axes, or without a section that of a homogeneous round rod of its stiffnesses; 0 for
 /// a cable.
 double radiusOf(const Material &m) {

@@ -155,4 +155,16 @@ DimensionlessGroups dimensionlessGroups(const Rod &rod, const Vec3 &gravity) {
   return g;
 }
 
+const char *nameOf(Support::Kind kind) {
+  switch (kind) {
+  case Support::Kind::clamp:
+    return "clamp";
+  case Support::Kind::pin:
+    return "pin";
+  case Support::Kind::fix_twist:
+    return "fix_twist";
+  }
+  return "";
+}
+
 } // namespace tendril

@@ -185,10 +185,8 @@ TEST(ArcLength, LeavesSmallBendingOfFineRodsRight) {
   }
 }
 
-/// Deep circular arch of 215 degrees, clamped at one end and hinged at the other, pushed down at the crown: DaDeppo & Schmidt (1975).
-/// Stiff out of its plane, for the path lies in it.
-Scene deepArch(int edges, double load, Measure measure = Measure::angle) {
-  const double radius = 100, half = 107.5 * pi / 180;
+/// An arc about the origin, `half` of its angle on either side of the top.
+Rod arcRod(int edges, double radius, double half, Measure measure) {
   Rod rod;
   rod.name = "arch";
   rod.measure = measure;
@@ -196,6 +194,13 @@ Scene deepArch(int edges, double load, Measure measure = Measure::angle) {
     const double angle = half * (1 - 2.0 * i / edges);
     rod.position.emplace_back(-radius * std::sin(angle), radius * std::cos(angle), 0);
   }
+  return rod;
+}
+
+/// Deep circular arch of 215 degrees, clamped at one end and hinged at the other, pushed down at the crown: DaDeppo & Schmidt (1975).
+/// Stiff out of its plane, for the path lies in it.
+Scene deepArch(int edges, double load, Measure measure = Measure::angle) {
+  Rod rod = arcRod(edges, 100, 107.5 * pi / 180, measure);
   rod.material = {1, 1e-6, 1e8, 1e9, {1e6, 1e9}, 0, 0};
   setBishopDirectors(rod, Vec3::UnitZ());
   Scene scene;
@@ -436,12 +441,7 @@ TEST(SwitchedBranch, OfADeepArchSways) {
 /// follow. A round one leaves its plane.
 TEST(SwitchedBranch, IsThatOfTheCriticalModeWhereAnotherMotionCostsNothing) {
   constexpr int edges = 32;
-  Rod rod;
-  rod.measure = Measure::angle;
-  for (int i = 0; i <= edges; ++i) {
-    const double angle = pi / 2 * (1 - 2.0 * i / edges);
-    rod.position.emplace_back(-std::sin(angle), std::cos(angle), 0);
-  }
+  Rod rod = arcRod(edges, 1, pi / 2, Measure::angle);
   rod.material = {1, 1e-6, 1e6, 1, {1, 1}, 0, 0};
   setBishopDirectors(rod, Vec3::UnitZ());
   Scene scene;

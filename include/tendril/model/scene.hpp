@@ -77,6 +77,8 @@ struct Support {
   bool holdsPosition() const { return kind != Kind::fix_twist; }
   bool holdsTwist() const { return kind != Kind::pin; }
 };
+/// As scenes and files of results have it.
+const char *nameOf(Support::Kind kind);
 
 /// Dead loads; torques act about the present tangent of their edge, moments are fixed in space.
 struct NodalForce {
