@@ -11,9 +11,6 @@ namespace tendril {
 constexpr const char *cannot_factor = "the Hessian cannot be factored; take more -load_steps, or look for rods that nothing holds";
 constexpr const char *vanishing_edge = "an edge vanishes or turns back on itself; use more edges, or a larger axial_stiffness";
 
-/// Of the Hessian's eigenvalues, in units of the softest bending: keeps solves regular where a motion costs nothing, a turn about an axis, say.
-constexpr double lift = 1e-7;
-
 void requireDeadLoads(const Scene &scene) {
   for (const Support &support : scene.supports)
     if (support.motion.moves())
@@ -111,7 +108,7 @@ PetscErrorCode ArcLength::solve(const Planes &gradient, Planes *step) {
 /// Unit tangent of the path at the iterate, on the side of the last step.
 PetscErrorCode ArcLength::tangent(Point *direction) {
   PetscFunctionBeginUser;
-  PetscCall(solver_.inertiaAtIterate(&negative_, lift));
+  PetscCall(solver_.inertiaAtIterate(&negative_, regular_lift));
   if (negative_ < 0) obstacle_ = cannot_factor;
   direction->factor = 1;
   PetscCall(solveLoad(&direction->unknowns));
@@ -162,7 +159,7 @@ PetscErrorCode ArcLength::iterate(const std::function<double(const Point &moved,
     if (*converged) PetscFunctionReturn(0);
     if (k == most_iterations) break;
     int negative;
-    PetscCall(solver_.inertiaAtIterate(&negative, lift));
+    PetscCall(solver_.inertiaAtIterate(&negative, regular_lift));
     if (negative < 0) {
       obstacle_ = cannot_factor;
       PetscFunctionReturn(0);
@@ -236,6 +233,23 @@ PetscErrorCode ArcLength::refine(State &state, Point *direction, bool *refined) 
   PetscFunctionReturn(0);
 }
 
+/// Says so where the loads move what costs nothing at the start of the path: a rod that hangs from one pin has no position without them.
+PetscErrorCode ArcLength::refuseFreeStart(const State &state) {
+  constexpr double little = 1e-5; // of the softest bending
+  PetscFunctionBeginUser;
+  Point direction;
+  PetscCall(begin(state, &direction));
+  int low, high;
+  PetscCall(solver_.inertiaAtIterate(&low, -little));
+  PetscCall(solver_.inertiaAtIterate(&high, little));
+  if (low <= high) PetscFunctionReturn(0);
+  std::ostringstream message;
+  message << "the path cannot start at load factor " << state.time << ": without loads a rod is free to move, as one that hangs from one pin is; hold it by a "
+             "clamp or a second pin, or use -continuation load";
+  failure_ = message.str();
+  PetscFunctionReturn(0);
+}
+
 /// One step along the path, or `along` another direction; the potential's iterate is its end when it converged.
 PetscErrorCode ArcLength::step(const State &state, double length, bool *converged, const Point *along) {
   constexpr double straying = 1.5; // of the step's length, from tangent to chord below 48 degrees: beyond it may be another branch
@@ -272,7 +286,7 @@ PetscErrorCode ArcLength::step(const State &state, double length, bool *converge
 /// The point between the ends of a step where the load factor turns: false position (Illinois) on the slope of the load factor along the path,
 /// by steps of other lengths from the same start.
 PetscErrorCode ArcLength::locateLimit(const State &start, const Point &before, const std::array<double, 2> &slopes, double length,
-                                      std::optional<CriticalPoint> *located) {
+                                      std::vector<CriticalPoint> *located) {
   constexpr int most_steps = 20;
   constexpr double flat = 1e-4; // of the slope at the start: the load factor is off by its square
   PetscFunctionBeginUser;
@@ -306,12 +320,12 @@ PetscErrorCode ArcLength::locateLimit(const State &start, const Point &before, c
   last_ = after;
   iterations_ = iterations;
   negative_ = negative;
-  if (point.state) *located = point;
+  if (point.state) located->push_back(std::move(point));
   PetscFunctionReturn(0);
 }
 
-/// The point between the ends of a step where the count of unstable motions changes while the load factor does not turn.
-PetscErrorCode ArcLength::locateBifurcation(const State &start, const State &end, const Point &before, double length, std::optional<CriticalPoint> *located) {
+/// The points between the ends of a step where the count of unstable motions changes while the load factor does not turn.
+PetscErrorCode ArcLength::locateBifurcation(const State &start, const State &end, const Point &before, double length, std::vector<CriticalPoint> *located) {
   constexpr double no_load = 1e-4; // of the step
   PetscFunctionBeginUser;
   const Point after = std::exchange(last_, before);
@@ -334,18 +348,22 @@ PetscErrorCode ArcLength::locateBifurcation(const State &start, const State &end
   Point direction;
   PetscCall(begin(start, &direction));
   PetscCall(countUnstable(solver_, &low.unstable));
-  CriticalPoint point;
-  bool found = false;
-  if (low.unstable >= 0) PetscCall(locateCritical(follow, low, length, length, &point, &found));
+  Step settings;
+  settings.mixed = settings_.mixed;
+  for (bool found = low.unstable >= 0; found;) {
+    CriticalPoint point;
+    PetscCall(locateCritical(solver_, settings, follow, low, length, length, &point, &found));
+    if (!found) break;
+    found = point.beyond.found;
+    low = point.beyond;
+    point.state->step = start.step;
+    point.limit = false;
+    // Where the load passes zero, what may turn about an axis costs nothing and becomes unstable, or stable: that is no critical load.
+    if (std::abs(point.load_factor) >= no_load * std::abs(start.time - end.time)) located->push_back(std::move(point));
+  }
   last_ = after;
   iterations_ = iterations;
   negative_ = negative;
-  // Where the load passes zero, what may turn about an axis costs nothing and becomes unstable, or stable: that is no critical load.
-  const bool unloaded = std::abs(point.load_factor) < no_load * std::abs(start.time - end.time);
-  if (!found || unloaded) PetscFunctionReturn(0);
-  point.state->step = start.step;
-  point.limit = false;
-  *located = point;
   PetscFunctionReturn(0);
 }
 
@@ -454,6 +472,8 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
       in_vain += iterations_;
       if (!refined) length *= 0.5;
       if (length >= shortest) continue;
+      if (taken == 0) PetscCall(refuseFreeStart(state));
+      if (!failure_.empty()) PetscFunctionReturn(0);
       std::ostringstream message;
       message << "step along the path at load factor " << state.time << " failed with length " << 2 * length << " after " << iterations_
               << (iterations_ == 1 ? " iteration: " : " iterations: ") << obstacle_ << (astray_ ? "" : imbalance());
@@ -465,26 +485,28 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     EnergyBudget energy = energyOf(state);
     Work work = staticWork(potential.scene(), potential.elements(), start, state, potential.start(), potential.iterate());
     ++taken;
-    std::optional<CriticalPoint> critical;
+    std::vector<CriticalPoint> critical;
     const bool locates = settings_.bifurcation != Bifurcation::off;
     if (locates && slope * direction.factor < 0)
       PetscCall(locateLimit(start, before_step, {slope, direction.factor}, length, &critical));
     else if (locates && crossed && potential.scene().moments.empty())
       PetscCall(locateBifurcation(start, state, before_step, length, &critical));
-    if (critical && on_critical) PetscCall(on_critical(*critical));
-    if (critical && settings_.bifurcation == Bifurcation::stop) {
-      state = *critical->state;
+    if (settings_.bifurcation != Bifurcation::locate && critical.size() > 1) critical.resize(1); // the run goes no further this way
+    for (const CriticalPoint &point : critical)
+      if (on_critical) PetscCall(on_critical(point));
+    if (!critical.empty() && settings_.bifurcation == Bifurcation::stop) {
+      state = *critical.front().state;
       *finished = true;
       PetscFunctionReturn(0);
     }
-    if (critical && !critical->limit && settings_.bifurcation == Bifurcation::switch_branch) {
+    if (!critical.empty() && !critical.front().limit && settings_.bifurcation == Bifurcation::switch_branch) {
       bool switched;
-      PetscCall(switchBranch(*critical, length, shortest, &state, &switched));
+      PetscCall(switchBranch(critical.front(), length, shortest, &state, &switched));
       if (!switched) {
         std::ostringstream message;
-        message << "no branch was found along the critical mode at load factor " << critical->load_factor << ": " << obstacle_;
+        message << "no branch was found along the critical mode at load factor " << critical.front().load_factor << ": " << obstacle_;
         failure_ = message.str();
-        state = *critical->state;
+        state = *critical.front().state;
         PetscFunctionReturn(0);
       }
       PetscCall(tangent(&direction));

@@ -40,7 +40,7 @@ void SharpTolerance::set(PetscReal rtol) {
   }
 }
 
-constexpr double neutral = 1e-9; // of the softest bending: above what Newton and rounding leave of a motion that costs nothing
+constexpr double neutral = 1e-8; // of the softest bending: above what Newton and rounding leave of a motion that costs nothing
 
 PetscErrorCode countUnstable(StepSolver &solver, int *unstable) {
   PetscFunctionBeginUser;
@@ -48,12 +48,33 @@ PetscErrorCode countUnstable(StepSolver &solver, int *unstable) {
   PetscFunctionReturn(0);
 }
 
+/// Makes an equilibrium the iterate.
+static void goTo(StepSolver &solver, const State &state, Step step) {
+  step.time = step.load_factor = state.time;
+  solver.begin(state, step);
+}
+
+/// Whether a motion loses its stiffness towards a critical point: at `there`, which is much nearer to it than `before`, the softest one that is stable has a
+/// small part of what it has at `before`. Where Newton only fails, or jumps, or where a motion costs nothing, none does.
+static PetscErrorCode softens(StepSolver &solver, const Step &step, const BranchPoint &before, const BranchPoint &there, bool *softer) {
+  constexpr double first = 1e-7, grows = 4, highest = 1e12, part = 0.1; // of the softest bending, and of what it was
+  PetscFunctionBeginUser;
+  int softest, count; // motions that cost nothing are counted in both
+  double stiffness = first;
+  goTo(solver, before.state, step);
+  PetscCall(solver.inertiaAtIterate(&softest, -stiffness));
+  for (count = softest; count == softest && stiffness < highest;) PetscCall(solver.inertiaAtIterate(&count, -(stiffness *= grows)));
+  goTo(solver, there.state, step);
+  PetscCall(solver.inertiaAtIterate(&count, -part * stiffness));
+  *softer = count > softest;
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode criticalMode(StepSolver &solver, const CriticalPoint &point, Step step, Planes *mode, bool *found) {
   PetscFunctionBeginUser;
   *found = false;
   if (!point.lost) PetscFunctionReturn(0);
-  step.time = step.load_factor = point.lost->time;
-  solver.begin(*point.lost, step);
+  goTo(solver, *point.lost, step);
   PetscCall(solver.criticalMode(point.stable_count, neutral, mode, found));
   PetscFunctionReturn(0);
 }
@@ -78,28 +99,40 @@ static PetscErrorCode bisect(const Follow &follow, BranchPoint *low, BranchPoint
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode locateCritical(const Follow &follow, BranchPoint low, double high, double scale, CriticalPoint *point, bool *found) {
-  constexpr int most_rounds = 6;
+PetscErrorCode locateCritical(StepSolver &solver, const Step &step, const Follow &follow, BranchPoint low, double high, double scale, CriticalPoint *point, bool *found) {
+  constexpr int most_rounds = 12;
   constexpr double interval = 1e-9, agreement = 1e-7, part = 1e-3; // of the scale, of the load factor, of the first interval
   PetscFunctionBeginUser;
   *found = false;
   const Doing here([](std::ostream &out) { out << "a critical load is searched for"; });
-  const double end = high, aside = std::max(part * (high - low.parameter), 1e-5 * scale);
+  const double start = low.parameter, end = high, aside = std::max(part * (high - low.parameter), 1e-5 * scale);
   double last = std::nan(""); // what the round before found
   bool ahead = false;         // whether the branch was found beyond
   BranchPoint before, beyond;
   PetscCall(follow(low, end, &beyond));
   for (int round = 0; round < most_rounds && !(beyond.found && beyond.unstable == low.unstable); ++round) {
     BranchPoint base;
+    auto goOn = [&] { // from where the branch goes on, for there is nothing here
+      low = beyond;
+      last = std::nan("");
+      high = end;
+      return follow(low, end, &beyond);
+    };
     PetscCall(bisect(follow, &low, &base, high, interval * scale, aside));
     if (std::abs(low.state.time - last) <= agreement * std::abs(last)) {
-      *found = true;
+      if (low.parameter > start) PetscCall(softens(solver, step, before, low, found));
+      if (!*found && !ahead) break;
+      if (!*found) {
+        PetscCall(goOn());
+        continue;
+      }
       point->load_factor = low.state.time;
       point->limit = !ahead;
       point->state = low.state;
       point->lost.reset();
       if (ahead) point->lost = (beyond.unstable > low.unstable ? beyond : before).state;
       point->stable_count = std::min(low.unstable, beyond.unstable);
+      point->beyond = std::move(beyond);
       PetscFunctionReturn(0);
     }
     last = low.state.time;
@@ -109,10 +142,7 @@ PetscErrorCode locateCritical(const Follow &follow, BranchPoint low, double high
     PetscCall(follow(before, behind, &beyond));
     if (beyond.found && beyond.unstable == low.unstable) { // the step had gone over to another branch: on along this one
       if (behind == end) break;
-      low = beyond;
-      last = std::nan("");
-      high = end;
-      PetscCall(follow(low, end, &beyond));
+      PetscCall(goOn());
     } else {
       ahead = beyond.found;
       high = behind;

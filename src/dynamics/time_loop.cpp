@@ -19,47 +19,84 @@ Step TimeLoop::stepOf(const LoopSettings &settings, const State &state, double d
   return step;
 }
 
-/// Stability was lost within the step: finds where, and moves `start` there when the run is to end or to go on along another branch.
+/// Newton may come to an unstable equilibrium, or pass it and only meet indefinite Hessians.
+static bool mayPassCritical(const NewtonReport &report) { return report.first_negative_pivots > 0 || report.shifts > 0; }
+
+/// Stability may be lost within the step: finds where, as often as the way that the run takes loses it, and moves `start` there when the run is to end or to
+/// go on along another branch.
 PetscErrorCode TimeLoop::locate(State &start, const Step &step, bool *moved) {
+  constexpr double growth = 8; // of the parts of a step behind a critical point: the shape changes by the root of the way there
+  PetscFunctionBeginUser;
+  State from = start, ahead;
+  Step part = step;
+  double reach = located_ > 0 ? growth * (start.time - located_) : step.time - start.time;
+  auto settle = [&](const State &at, double factor, NewtonReport *report) { // the way that the run takes
+    PetscFunctionBeginUser;
+    part.time = part.load_factor = factor;
+    PetscCall(solver_.solve(at, part, report));
+    ahead = at;
+    if (report->converged) solver_.potential().commit(ahead);
+    PetscFunctionReturn(0);
+  };
+  for (bool more = true; more; more = part.time < step.time) {
+    NewtonReport report;
+    report.shifts = 1; // of the whole step that is known
+    const double end = std::min(step.time, from.time + reach);
+    if (from.time > start.time || end < step.time) {
+      PetscCall(settle(from, end, &report));
+      if (!report.converged) break;
+    }
+    CriticalPoint point;
+    bool found = false;
+    if (mayPassCritical(report)) PetscCall(locateNext(from, part, &point, &found));
+    reach = growth * (end - from.time);
+    if (found) {
+      point.state->step = start.step;
+      located_ = point.load_factor;
+      if (on_critical) PetscCall(on_critical(point));
+      bool leaves = false;
+      Planes mode;
+      if (settings_.bifurcation == Bifurcation::switch_branch) PetscCall(criticalMode(solver_, point, step, &mode, &leaves));
+      if (leaves) mode_ = std::move(mode);
+      *moved = settings_.bifurcation == Bifurcation::stop || leaves;
+      if (*moved) start = *point.state;
+      if (*moved || !point.lost) break;
+      PetscCall(settle(*point.lost, point.lost->time, &report));
+      if (!report.converged) break;
+      reach = growth * (part.time - point.load_factor);
+    }
+    from = ahead;
+  }
+  PetscFunctionReturn(0);
+}
+
+/// Where stability is lost first between an equilibrium and the end of the step.
+PetscErrorCode TimeLoop::locateNext(const State &start, const Step &step, CriticalPoint *point, bool *found) {
   PetscFunctionBeginUser;
   const double width = step.time - start.time;
-  CriticalPoint point;
-  bool found;
-  {
-    const SharpTolerance sharp(solver_);
-    auto follow = [&](const BranchPoint &from, double factor, BranchPoint *to) -> PetscErrorCode {
-      PetscFunctionBeginUser;
-      *to = from;
-      to->parameter = factor;
-      to->found = false;
-      if (factor <= 0) PetscFunctionReturn(0); // without loads a rod may be in any position
-      Step there = step;
-      there.time = there.load_factor = factor;
-      NewtonReport report;
-      PetscCall(solver_.solve(from.state, there, &report, Seek::equilibrium));
-      to->found = report.converged && SharpTolerance::isMet(report.residual);
-      if (!to->found) PetscFunctionReturn(0);
-      PetscCall(countUnstable(solver_, &to->unstable));
-      solver_.potential().commit(to->state);
-      // Before a limit point a rod moves by the root of the interval; beyond it, Newton jumps.
-      to->found = to->unstable >= 0 && distanceBetween(from.state, to->state) <= std::sqrt(std::abs(factor - from.parameter) / width);
-      PetscFunctionReturn(0);
-    };
-    BranchPoint low;
-    low.parameter = start.time;
-    low.state = start;
-    PetscCall(locateCritical(follow, low, step.time, std::abs(step.time), &point, &found));
-  }
-  if (!found) PetscFunctionReturn(0);
-  point.state->step = start.step;
-  located_ = point.load_factor;
-  if (on_critical) PetscCall(on_critical(point));
-  bool leaves = false;
-  Planes mode;
-  if (settings_.bifurcation == Bifurcation::switch_branch) PetscCall(criticalMode(solver_, point, step, &mode, &leaves));
-  if (leaves) mode_ = std::move(mode);
-  *moved = settings_.bifurcation == Bifurcation::stop || leaves;
-  if (*moved) start = *point.state;
+  const SharpTolerance sharp(solver_);
+  auto follow = [&](const BranchPoint &from, double factor, BranchPoint *to) -> PetscErrorCode {
+    PetscFunctionBeginUser;
+    *to = from;
+    to->parameter = factor;
+    to->found = false;
+    if (factor <= 0) PetscFunctionReturn(0); // without loads a rod may be in any position
+    Step there = step;
+    there.time = there.load_factor = factor;
+    NewtonReport report;
+    PetscCall(solver_.solve(from.state, there, &report, Seek::equilibrium));
+    to->found = report.converged && SharpTolerance::isMet(report.residual);
+    if (!to->found) PetscFunctionReturn(0);
+    PetscCall(countUnstable(solver_, &to->unstable));
+    solver_.potential().commit(to->state);
+    // Before a limit point a rod moves by the root of the interval; beyond it, Newton jumps.
+    to->found = to->unstable >= 0 && distanceBetween(from.state, to->state) <= std::sqrt(std::abs(factor - from.parameter) / width);
+    PetscFunctionReturn(0);
+  };
+  BranchPoint low;
+  low.parameter = start.time;
+  low.state = start;
+  PetscCall(locateCritical(solver_, step, follow, low, step.time, std::abs(step.time), point, found));
   PetscFunctionReturn(0);
 }
 
@@ -306,10 +343,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     }
     // Couples have no potential: the inertia of the symmetric part says nothing about stability.
     const bool detects = !settings_.dynamic && settings_.bifurcation != Bifurcation::off && potential.scene().moments.empty();
-    // Newton may pass an unstable equilibrium and only meet indefinite Hessians. Who asks for a critical load has that looked into.
-    const bool asks = settings_.bifurcation == Bifurcation::stop || settings_.bifurcation == Bifurcation::switch_branch;
-    const bool passed = report.first_negative_pivots > 0 || (asks && report.shifts > 0);
-    if (detects && stable && passed && located_ <= state.time) {
+    if (detects && stable && mayPassCritical(report) && located_ <= state.time) {
       bool moved = false;
       const State before = state;
       PetscCall(locate(state, step, &moved));

@@ -243,7 +243,7 @@ PetscErrorCode NewtonSolver::assemble(Mat) {
   secants_.clear();
   for (int r = rods_.begin; r < rods_.end; ++r)
     if (work_->wanted[r]) potential_->derivatives({r, r + 1});
-  fill(work_->shift, 0.0);
+  for (int r = rods_.begin; r < rods_.end; ++r) work_->shift[r] = follows_ ? regular_lift * firstShift(r) : 0;
   PetscCall(refill());
   PetscFunctionReturn(0);
 }
@@ -678,6 +678,7 @@ std::string NewtonSolver::unstableRod() const {
 
 /// SNES from the potential's iterate. `failure` is empty when it converged.
 PetscErrorCode NewtonSolver::newton(std::string *failure) {
+  constexpr int limits_from_saddle = 10;
   SNESConvergedReason reason;
   PetscFunctionBeginUser;
   PetscCall(SNESGetTolerances(snes_, nullptr, &rtol_, nullptr, nullptr, nullptr));
@@ -688,10 +689,14 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
   age_ = 0;
   lost_.clear();
   PetscCall(writeIterate(x_));
-  spent_ = report_.iterations;
-  PetscCall(SNESSolve(snes_, nullptr, x_));
-  report_.iterations += std::exchange(spent_, 0);
-  PetscCall(SNESGetConvergedReason(snes_, &reason));
+  // From a saddle the way down may be long, and shorter load steps begin at the same one.
+  int limits = report_.escapes > 0 && patience_ == 0 ? limits_from_saddle : 1;
+  do {
+    spent_ = report_.iterations;
+    PetscCall(SNESSolve(snes_, nullptr, x_));
+    report_.iterations += std::exchange(spent_, 0);
+    PetscCall(SNESGetConvergedReason(snes_, &reason));
+  } while (reason == SNES_DIVERGED_MAX_IT && --limits > 0);
   failure->clear();
   if (reason > 0 || creeps_) PetscFunctionReturn(0); // a saddle nearby is left as one that was reached
   report_.lost = !lost_.empty() && (reason == SNES_DIVERGED_LOCAL_MIN || reason == SNES_DIVERGED_LINE_SEARCH);
@@ -834,6 +839,7 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
   system_.edge_metric = is_static ? work_->edge_metric.data() : nullptr; // in dynamics, inertia is what holds short waves
   report_ = {};
   seek_ = seek;
+  follows_ = seek == Seek::equilibrium;
   patience_ = patience;
   sharpness_ = 1;
   likely_ = spent_ = 0;

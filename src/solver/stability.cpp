@@ -2,6 +2,8 @@
 #include "tendril/solver/activity.hpp"
 #include "tendril/solver/newton.hpp"
 
+#include <Eigen/Eigenvalues>
+
 #include <algorithm>
 #include <cmath>
 
@@ -119,15 +121,17 @@ PetscErrorCode NewtonSolver::shiftUntilPositive(bool regular) {
   PetscFunctionReturn(0);
 }
 
-/// A fixed start without symmetry for the search of a mode, in work_->increment: the same on every machine, orthogonal to no mode of interest.
-void NewtonSolver::beginMode() {
+/// One of two fixed starts without symmetry for the search of a mode, in work_->increment: the same on every machine. Of two modes in different planes that
+/// are alike, as those of a round rod, a state may have left along the first start; then it is orthogonal to what is left, and the second is not.
+void NewtonSolver::beginMode(int start) {
+  constexpr double weight[2][slot_size] = {{1, 1, 1, 1}, {1, -2, 3, -4}};
   const DofMap &dofs = potential_->dofs();
   work_->increment.clear();
   for (int r = rods_.begin; r < rods_.end; ++r) {
     const RodRange &rod = dofs.rods()[r];
     for (int i = 0; i < rod.vertices; ++i)
       for (int a = 0; a < slot_size; ++a)
-        if (dofs.unknown(rod.slot(i), a) >= 0) work_->increment[a][rod.slot(i)] = 1 + 0.5 * std::sin(1.7 * (slot_size * i + a));
+        if (dofs.unknown(rod.slot(i), a) >= 0) work_->increment[a][rod.slot(i)] = weight[start][a] * (1 + 0.5 * std::sin(1.7 * (slot_size * i + a)));
     dofs.copyBehindRing(rod, work_->increment);
   }
 }
@@ -180,7 +184,7 @@ PetscErrorCode NewtonSolver::criticalMode(int stable, double *lift, Planes *mode
   }
   *lift = high;
   PetscCall(inertiaAtIterate(&negative, high));
-  beginMode();
+  beginMode(0);
   normaliseMode();
   for (int k = 0; k < iterations; ++k) {
     watch().beat();
@@ -212,9 +216,51 @@ PetscErrorCode NewtonSolver::criticalMode(int stable, double *lift, Planes *mode
   PetscFunctionReturn(0);
 }
 
+namespace {
+
+/// A motion v, A v and (A - K) v, with the Hessian K and a definite matrix A beside it.
+struct Probe {
+  Planes motion, stiff, soft;
+};
+
+/// The combination of up to three probes with the largest quotient of v'(A - K)v and v'Av, rod by rod: a step of locally optimal conjugate gradients (Knyazev
+/// 2001) from `x` along `w`, and what the last step moved by, `p`. `x` has v'Av = 1 then.
+void improve(const RodRange &rod, const Probe &w, Probe &x, Probe &p, int count) {
+  const std::array<const Probe *, 3> basis{&w, &x, &p};
+  Eigen::MatrixXd stiff(3, 3), soft(3, 3);
+  for (int i = 0; i < count; ++i)
+    for (int j = 0; j <= i; ++j) {
+      stiff(i, j) = stiff(j, i) = dot(rod, basis[i]->motion, basis[j]->stiff);
+      soft(i, j) = soft(j, i) = dot(rod, basis[i]->motion, basis[j]->soft);
+    }
+  Eigen::Vector3d share = Eigen::Vector3d::Zero();
+  for (bool independent = false; count > 0 && !independent; --count) { // what is almost a combination of the others is left out
+    const Eigen::VectorXd scale = stiff.diagonal().head(count).cwiseSqrt().cwiseInverse();
+    const Eigen::MatrixXd a = scale.asDiagonal() * stiff.topLeftCorner(count, count) * scale.asDiagonal();
+    independent = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(a).eigenvalues()[0] > 1e-10;
+    if (!independent) continue;
+    const Eigen::MatrixXd b = scale.asDiagonal() * soft.topLeftCorner(count, count) * scale.asDiagonal();
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> ritz(b, a);
+    share.head(count) = scale.cwiseProduct(ritz.eigenvectors().col(count - 1));
+  }
+  auto combine = [&](Planes Probe::*part) {
+    for (int a = 0; a < slot_size; ++a) {
+      const double *along = (w.*part)[a];
+      double *here = (x.*part)[a], *last = (p.*part)[a];
+      for (int s = rod.first_slot; s < rod.vertexEnd() + 2; ++s) {
+        last[s] = share[0] * along[s] + share[2] * last[s];
+        here[s] = share[1] * here[s] + last[s];
+      }
+    }
+  };
+  for (Planes Probe::*part : {&Probe::motion, &Probe::stiff, &Probe::soft}) combine(part);
+}
+
+} // namespace
+
 /// Directions of negative curvature of the rods with negative pivots, in work_->increment. With the Hessian K = E - G split into the part E without
-/// compression and the effect G of compression, iterating v <- E^-1 G v gives the first buckling mode, the smoothest way out. Where compression
-/// is not the cause, or leaves motions without stiffness, inverse iteration with the shifted Hessian finds the lowest mode, beginning from the last shift.
+/// compression and the effect G of compression, the largest eigenvalue of E^-1 G belongs to the first buckling mode, the smoothest way out. Where
+/// compression is not the cause, or leaves motions without stiffness, the shifted Hessian in place of E gives the lowest mode, beginning from the last shift.
 /// `neutral`: rods whose mode costs no energy, to rounding, and that nothing goes down from: a turn of the whole rod about an axis, say.
 PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::vector<char> *neutral) {
   // Of the energies that balance, stiff edges leave 1e-7 by rounding; and what the forces are out of balance by, a neutral motion is curved by.
@@ -246,48 +292,52 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
     }
     const bool definite = buckling && report_.zero_pivots == 0;
     // With A v = b solved, v'K v = v'b - v'(A - K)v: the stiff part of A never enters, whose rounding would hide a small curvature.
-    auto soften = [&] { // (A - K) v
-      Planes y = dofs.makePlanes();
+    auto soften = [&](const Planes &v, Planes &y) { // (A - K) v
+      y.clear();
       for (int r = rods_.begin; r < rods_.end; ++r) {
         const RodRange &rod = e.rods[r];
         if (buckling)
-          softening.multiply(rod, work_->increment, y);
+          softening.multiply(rod, v, y);
         else
-          addMetric(work_->metric, system_.edge_metric, rod, work_->shift[r], work_->increment, y);
+          addMetric(work_->metric, system_.edge_metric, rod, work_->shift[r], v, y);
         dofs.fold(rod, y);
       }
-      return y;
     };
-    auto normalise = [&] {
-      for (int r = rods_.begin; r < rods_.end; ++r) {
-        const double size = std::sqrt(massOf(r));
-        for (int a = 0; a < slot_size && size > 0; ++a)
-          for (int s = e.rods[r].first_slot; s < e.rods[r].vertexEnd() + 2; ++s) work_->increment[a][s] /= size;
-      }
-    };
-    beginMode();
-    normalise();
-    Planes right = soften();
-    std::vector<double> before(neutral->size(), HUGE_VAL);
     bool settled = false; // what more iterations would not change
-    for (int k = 0; k < 100 && !settled; ++k) {
-      watch().beat();
-      PetscCall(solveLinear(right, work_->increment));
-      const Planes soft = soften();
-      done = settled = true;
-      for (int r = rods_.begin; r < rods_.end; ++r) {
-        if (negative[r] == 0) continue;
-        const double stiffness = dot(e.rods[r], work_->increment, right), softness = dot(e.rods[r], work_->increment, soft);
-        const double noise = rounding * std::abs(stiffness) + hessianNoise(r, work_->increment), change = softness - stiffness - before[r];
-        before[r] = softness - stiffness;
-        (*found)[r] = k >= 5 && softness - stiffness > noise;
-        // Compression that makes up for no mode's stiffness leaves a definite Hessian: its negative pivots are rounding.
-        (*neutral)[r] = std::abs(softness - stiffness) <= noise || (definite && !(softness > 0.5 * stiffness));
-        done = done && (*found)[r];
-        settled = settled && ((*found)[r] || (k >= 5 && std::abs(softness - stiffness) <= noise && std::abs(change) < 1e-3 * noise));
+    for (int start = 0; start < 2 && !done; ++start) {
+      Planes room(slot_size, dofs.slots(rods_));
+      room.setOrigin(dofs.rods()[rods_.begin].first_slot);
+      Probe w{room, room, room}, x = w, p = w;
+      beginMode(start);
+      soften(work_->increment, x.soft);
+      std::vector<double> before(neutral->size(), HUGE_VAL);
+      settled = false;
+      for (int k = 0; k < 100 && !settled; ++k) {
+        for (int r = rods_.begin; r < rods_.end && k > 0; ++r)
+          if (negative[r] > 0) improve(e.rods[r], w, x, p, std::min(k, 3));
+        watch().beat();
+        w.stiff = x.soft;
+        PetscCall(solveLinear(w.stiff, w.motion));
+        soften(w.motion, w.soft);
+        done = settled = true;
+        bool told = true; // of every rod, whether there is a way down
+        for (int r = rods_.begin; r < rods_.end; ++r) {
+          if (negative[r] == 0) continue;
+          const double stiffness = dot(e.rods[r], w.motion, w.stiff), softness = dot(e.rods[r], w.motion, w.soft);
+          const double noise = rounding * std::abs(stiffness) + hessianNoise(r, w.motion), change = softness - stiffness - before[r];
+          before[r] = softness - stiffness;
+          (*found)[r] = k >= 5 && softness - stiffness > noise;
+          // Compression that makes up for no mode's stiffness leaves a definite Hessian: its negative pivots are rounding.
+          (*neutral)[r] = std::abs(softness - stiffness) <= noise || (definite && !(softness > 0.5 * stiffness));
+          settled = settled && ((*found)[r] || (k >= 5 && std::abs(change) < 1e-3 * noise));
+          done = done && (*found)[r];
+          told = told && ((*found)[r] || (*neutral)[r]);
+        }
+        done = done || (settled && told);
       }
-      normalise();
-      right = soften();
+      for (int r = rods_.begin; r < rods_.end; ++r)
+        for (int a = 0; a < slot_size; ++a)
+          std::copy(w.motion[a] + e.rods[r].first_slot, w.motion[a] + e.rods[r].vertexEnd() + 2, work_->increment[a] + e.rods[r].first_slot);
     }
     done = done || definite || (settled && !buckling);
   }

@@ -356,16 +356,80 @@ TEST(CriticalFactor, AlongTheArcLengthIsThatOfLoadSteps) {
   EXPECT_EQ(stopped.end, *stopped.critical[0].state);
 }
 
+/// Two columns of the scene, the second stiffer: both are found, within one step or in two, whatever else has buckled.
+TEST(CriticalFactor, OfTwoRodsAreBothFoundWhateverTheSteps) {
+  Scene scene = column(64, pi * pi); // four times the critical load of the first
+  scene.rods[0].material.axial_stiffness = 1e6;
+  Rod stiffer = scene.rods[0];
+  stiffer.name = "stiffer";
+  for (Vec3 &x : stiffer.position) x.y() += 1;
+  stiffer.material.flexural_stiffness = {1.05, 1.05};
+  scene.rods.push_back(stiffer);
+  scene.supports.push_back(scene.supports[0]);
+  scene.supports.back().rod = 1;
+  scene.forces.push_back(scene.forces[0]);
+  scene.forces.back().rod = 1;
+  const double exact = discreteEulerLoad(64) / (pi * pi);
+  for (const LoopSettings &settings : {statics(1), statics(2), statics(5), statics(7), statics(40), along(3, 200), along(40, 200)}) {
+    const Path path = follow(scene, settings);
+    ASSERT_EQ(path.critical.size(), 2u) << settings.dt;
+    for (int r = 0; r < 2; ++r) EXPECT_NEAR(path.critical[r].load_factor, (r == 0 ? 1 : 1.05) * exact, 3e-6) << settings.dt; // F/EA = 2.5e-6
+  }
+}
+
+/// A round column between clamps buckles in any plane, and may turn its plane at no cost. Just past the critical load that turn looks unstable.
+TEST(CriticalFactor, OfAShortenedRoundColumnIsOneWhateverTheSteps) {
+  Scene scene;
+  scene.gravity.setZero();
+  scene.rods = {straightRod(40)};
+  scene.rods[0].material = {1, 0, 1e4, 1, {1, 1}, 0, 0};
+  for (const Support::Kind kind : {Support::Kind::clamp, Support::Kind::pin}) {
+    scene.supports = {hold(scene, 0, 0, kind), hold(scene, 0, 40, kind)};
+    const double critical = (kind == Support::Kind::clamp ? 4 : 1) * pi * pi / 1e4;
+    scene.supports[1].motion.velocity = Vec3(-2.5 * critical, 0, 0);
+    double first = 0;
+    for (const int steps : {1, 3, 10, 40, 80, 160, 320}) {
+      const Path path = follow(scene, statics(steps));
+      ASSERT_EQ(path.critical.size(), 1u) << steps;
+      EXPECT_FALSE(path.critical[0].limit) << steps;
+      EXPECT_EQ(path.end.time, 1) << steps;
+      if (first == 0) first = path.critical[0].load_factor;
+      EXPECT_NEAR(path.critical[0].load_factor, first, step_tolerance * first) << steps;
+    }
+    EXPECT_NEAR(first, 0.4, 0.4 * 3e-3); // 40 edges, and EA
+  }
+}
+
+/// The end of a rod comes back to where it was: its stiffness grows without bound, and Newton fails there. That is no critical load.
+TEST(CriticalFactor, IsNoneWhereNewtonOnlyFails) {
+  const Scene scene = sceneOf("verify/tangent_loop.yaml");
+  for (const int steps : {1, 2, 5, 20, 36}) EXPECT_TRUE(follow(scene, statics(steps)).critical.empty()) << steps;
+}
+
+TEST(ArcLength, RefusesARodThatIsFreeToSwingWithoutLoads) {
+  Scene scene = clampedScene(straightRod(20));
+  scene.supports = {hold(scene, 0, 0, Support::Kind::pin)};
+  scene.gravity = Vec3(0, -9.81, 0);
+  Simulation sim;
+  ASSERT_EQ(sim.setUp(scene, along(10, 20)), PetscErrorCode(0));
+  ArcLength loop(sim.solver, along(10, 20));
+  bool finished = true;
+  ASSERT_EQ(loop.run(sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished), PetscErrorCode(0));
+  EXPECT_FALSE(finished);
+  EXPECT_NE(loop.failure().find("without loads a rod is free to move"), std::string::npos) << loop.failure();
+}
+
 /// Load steps snap past it to a stable shape far off.
 TEST(CriticalFactor, OfALimitPointIsThatOfTheArcLength) {
   const Path path = follow(deepArch(64, 1000), along(20, 30));
   ASSERT_GE(path.critical.size(), 1u);
-  for (const int steps : {5, 10, 20, 80}) {
-    const Path load = follow(deepArch(64, 1000), stopping(steps));
-    ASSERT_EQ(load.critical.size(), 1u) << steps;
-    EXPECT_TRUE(load.critical[0].limit) << steps;
-    EXPECT_NEAR(load.critical[0].load_factor, path.critical[0].load_factor, step_tolerance) << steps;
-  }
+  for (const int steps : {1, 2, 5, 10, 20, 80})
+    for (const LoopSettings &settings : {stopping(steps), statics(steps)}) {
+      const Path load = follow(deepArch(64, 1000), settings);
+      ASSERT_EQ(load.critical.size(), 1u) << steps;
+      EXPECT_TRUE(load.critical[0].limit) << steps;
+      EXPECT_NEAR(load.critical[0].load_factor, path.critical[0].load_factor, step_tolerance) << steps;
+    }
 }
 
 /// A clamped column of length 1 is half of a pinned one of length 2: load P/4, tip at (1 - shortening, 2 ymax) of elastica_postbuckling.csv.

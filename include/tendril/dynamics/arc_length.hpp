@@ -58,10 +58,11 @@ private:
   PetscErrorCode correctAt(double factor, bool *converged);
   PetscErrorCode iterate(const std::function<double(const Point &moved, const Point &residual, const Point &load)> &constraint, double start, bool *converged);
   PetscErrorCode begin(const State &state, Point *direction);
+  PetscErrorCode refuseFreeStart(const State &state);
   PetscErrorCode refine(State &state, Point *direction, bool *refined);
   PetscErrorCode step(const State &state, double length, bool *converged, const Point *along = nullptr);
-  PetscErrorCode locateLimit(const State &start, const Point &before, const std::array<double, 2> &slopes, double length, std::optional<CriticalPoint> *point);
-  PetscErrorCode locateBifurcation(const State &start, const State &end, const Point &before, double length, std::optional<CriticalPoint> *point);
+  PetscErrorCode locateLimit(const State &start, const Point &before, const std::array<double, 2> &slopes, double length, std::vector<CriticalPoint> *located);
+  PetscErrorCode locateBifurcation(const State &start, const State &end, const Point &before, double length, std::vector<CriticalPoint> *located);
   PetscErrorCode switchBranch(const CriticalPoint &critical, double length, double shortest, State *state, bool *switched);
 };
 

@@ -9,15 +9,6 @@
 
 namespace tendril {
 
-struct CriticalPoint {
-  double load_factor = 0;
-  std::optional<State> state; ///< equilibrium there
-  bool limit = false;         ///< the path turns back in the load there, instead of going on unstable
-  std::optional<State> lost;  ///< equilibrium a little away, on the side where more motions are unstable; no value at limit points
-  int stable_count = 0;       ///< of unstable motions on the other side
-};
-using CriticalObserver = std::function<PetscErrorCode(const CriticalPoint &)>;
-
 /// An equilibrium on a branch.
 struct BranchPoint {
   double parameter = 0; ///< of the branch: load factor, or length along it
@@ -25,6 +16,16 @@ struct BranchPoint {
   int unstable = 0;     ///< motions in which it is no minimum; those that cost nothing are left out
   bool found = false;   ///< whether Newton came to one, and near
 };
+struct CriticalPoint {
+  double load_factor = 0;
+  std::optional<State> state; ///< equilibrium there
+  bool limit = false;         ///< the path turns back in the load there, instead of going on unstable
+  std::optional<State> lost;  ///< equilibrium a little away, on the side where more motions are unstable; no value at limit points
+  int stable_count = 0;       ///< of unstable motions on the other side
+  BranchPoint beyond;         ///< a little further along the branch; not found at limit points
+};
+using CriticalObserver = std::function<PetscErrorCode(const CriticalPoint &)>;
+
 /// Goes along a branch from a point of it to a value of its parameter, by plain Newton without escapes.
 using Follow = std::function<PetscErrorCode(const BranchPoint &from, double parameter, BranchPoint *to)>;
 
@@ -33,8 +34,9 @@ PetscErrorCode criticalMode(StepSolver &solver, const CriticalPoint &point, Step
 
 /// Finds the critical point between `low` and the parameter `high` by bisection to 1e-9 of `scale`, and once more from points on either side of it, in
 /// other steps. `point` is the end of the interval towards `low`. `found` is false where there is none: nothing changes, Newton had gone over to
-/// another branch, or the two answers differ by more than 1e-7, as they do where a count is rounding.
-PetscErrorCode locateCritical(const Follow &follow, BranchPoint low, double high, double scale, CriticalPoint *point, bool *found);
+/// another branch, no motion loses its stiffness, or the two answers differ by more than 1e-7, as they do where a count is rounding.
+/// \param step its settings, but the load
+PetscErrorCode locateCritical(StepSolver &solver, const Step &step, const Follow &follow, BranchPoint low, double high, double scale, CriticalPoint *point, bool *found);
 
 /// Counts the unstable motions at the iterate: eigenvalues of the Hessian below a little less than zero, which leaves motions out that cost nothing.
 PetscErrorCode countUnstable(StepSolver &solver, int *unstable);

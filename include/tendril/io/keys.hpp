@@ -217,24 +217,30 @@ inline constexpr Key keys[] = {
      "all is director, velocity, twist_rate, axial_force and turns; what is not in the state is named, e.g. all,force,moment"},
 };
 
+/// Row of a key in the table, or the number of its rows.
+constexpr std::size_t rowOf(std::string_view path) {
+  std::size_t row = 0;
+  while (row < std::size(keys) && keys[row].path != path) ++row;
+  return row;
+}
+
 constexpr const Key *findKey(std::string_view path) {
-  for (const Key &key : keys)
-    if (key.path == path) return &key;
-  return nullptr;
+  const std::size_t row = rowOf(path);
+  return row < std::size(keys) ? &keys[row] : nullptr;
 }
 
 /// A key of the table that one reads as one of some types.
 template <KeyType... types> class KeyOf {
 public:
-  consteval KeyOf(const char *path) : row_(findKey(path)) {
-    if (!row_) throw "this key is not in the table of keys.hpp";
-    if (sizeof...(types) > 0 && !((row_->type == types) || ...)) throw "this key has another type in the table of keys.hpp";
+  consteval KeyOf(const char *path) : row_(rowOf(path)) {
+    if (row_ == std::size(keys)) throw "this key is not in the table of keys.hpp";
+    if (sizeof...(types) > 0 && !((keys[row_].type == types) || ...)) throw "this key has another type in the table of keys.hpp";
   }
-  const Key &operator*() const { return *row_; }
-  const Key *operator->() const { return row_; }
+  const Key &operator*() const { return keys[row_]; }
+  const Key *operator->() const { return &keys[row_]; }
 
 private:
-  const Key *row_;
+  std::size_t row_;
 };
 using AnyKey = KeyOf<>;
 

@@ -44,6 +44,10 @@ bool isAtNoise(const IncrementalPotential::Residual &residual, double rtol);
 /// Which equilibria are answers in statics: minima, or any, reached by Newton's own full steps, for following a branch.
 enum class Seek { minimum, equilibrium };
 
+/// Of the Hessian's eigenvalues, in units of the softest bending: where a branch is followed, keeps solves regular where a motion costs nothing, a turn about
+/// an axis, say.
+constexpr double regular_lift = 1e-7;
+
 /// Where Newton begins instead of at the start of a step.
 struct Guess {
   Planes unknowns;    ///< displacements and spins since the start
@@ -131,6 +135,7 @@ private:
   PetscObjectState iterate_state_ = 0;     ///< ... and its state when they were written
   NewtonReport report_;
   Seek seek_ = Seek::minimum;
+  bool follows_ = false; ///< whether the solve is for an equilibrium of any kind
   int patience_ = 0, spent_ = 0;    ///< iterations that the solve may take, 0: no bound; and those before SNES began
   double sharpness_ = 1, rtol_ = 0; ///< of -snes_rtol, and what is asked for now
   /// A step and what it changed of the gradient, by unknowns; per rod one over their product, 0 where that is not positive (BFGS).
@@ -178,7 +183,7 @@ private:
   std::string farthest();
   std::string unstableRod() const;
   std::string roundingMessage(int rod, double size) const;
-  void beginMode();
+  void beginMode(int start);
   double massOf(int r) const;
   double normaliseMode();
   double turningOf(int rod) const;
