@@ -311,6 +311,7 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   const OutputFolder folder(o.output_dir);
   Choice choice;
   if (o.accuracy) PetscCall(meetAccuracy(prepared, o, &choice));
+  const StopRequest request(begin, o.time_limit); // before this, nothing is written: a signal ends the run at once
   Simulation &run = *prepared.run;
   TimeLoop loop(run.solver, o.loop);
   RunFacts facts(run.scene, o.loop, textOf(prepared.source));
@@ -402,7 +403,6 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   };
   bool finished;
   std::string failure;
-  const StopRequest request(begin, o.time_limit);
   auto stops = [&] { return request.asked(); };
   if (arclength) {
     ArcLength path(run.solver, o.loop);

@@ -265,6 +265,7 @@ void improve(const RodRange &rod, const Probe &w, Probe &x, Probe &p, int count)
 PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::vector<char> *neutral) {
   // Of the energies that balance, stiff edges leave 1e-7 by rounding; and what the forces are out of balance by, a neutral motion is curved by.
   const double rounding = std::clamp(10 * report_.residual.force, 1e-7, 1e-5);
+  constexpr int enough = 5; // iterations for a mode that is not close to another
   PetscFunctionBeginUser;
   const DofMap &dofs = potential_->dofs();
   const Elements &e = potential_->elements();
@@ -314,7 +315,7 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
       settled = false;
       for (int k = 0; k < 100 && !settled; ++k) {
         for (int r = rods_.begin; r < rods_.end && k > 0; ++r)
-          if (negative[r] > 0) improve(e.rods[r], w, x, p, std::min(k, 3));
+          if (negative[r] > 0) improve(e.rods[r], w, x, p, std::clamp(k - enough, 1, 3)); // first by inverse iteration, whose mode is smooth
         watch().beat();
         w.stiff = x.soft;
         PetscCall(solveLinear(w.stiff, w.motion));
@@ -326,10 +327,10 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
           const double stiffness = dot(e.rods[r], w.motion, w.stiff), softness = dot(e.rods[r], w.motion, w.soft);
           const double noise = rounding * std::abs(stiffness) + hessianNoise(r, w.motion), change = softness - stiffness - before[r];
           before[r] = softness - stiffness;
-          (*found)[r] = k >= 5 && softness - stiffness > noise;
+          (*found)[r] = k >= enough && softness - stiffness > noise;
           // Compression that makes up for no mode's stiffness leaves a definite Hessian: its negative pivots are rounding.
           (*neutral)[r] = std::abs(softness - stiffness) <= noise || (definite && !(softness > 0.5 * stiffness));
-          settled = settled && ((*found)[r] || (k >= 5 && std::abs(change) < 1e-3 * noise));
+          settled = settled && ((*found)[r] || (k >= enough && std::abs(change) < 1e-3 * noise));
           done = done && (*found)[r];
           told = told && ((*found)[r] || (*neutral)[r]);
         }

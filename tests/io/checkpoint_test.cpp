@@ -18,7 +18,7 @@ namespace {
 class Filler {
 public:
   explicit Filler(const Elements &elements) : elements_(elements) {}
-  void operator()(double &v) { v = ++count_ + 1.0 / 3; }
+  void operator()(double &v) { v = 2 + std::sin(++count_); } // no two alike, and no rod of them is straight
   void operator()(int &v) { v = ++count_; }
   void operator()(std::int64_t &v) { v = ++count_; }
   void operator()(bool &v) { v = !v; }
