@@ -472,11 +472,12 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
       in_vain += iterations_;
       if (!refined) length *= 0.5;
       if (length >= shortest) continue;
+      const std::string out_of_balance = astray_ ? "" : imbalance();
       if (taken == 0) PetscCall(refuseFreeStart(state));
       if (!failure_.empty()) PetscFunctionReturn(0);
       std::ostringstream message;
       message << "step along the path at load factor " << state.time << " failed with length " << 2 * length << " after " << iterations_
-              << (iterations_ == 1 ? " iteration: " : " iterations: ") << obstacle_ << (astray_ ? "" : imbalance());
+              << (iterations_ == 1 ? " iteration: " : " iterations: ") << obstacle_ << out_of_balance;
       failure_ = message.str();
       PetscFunctionReturn(0);
     }
