@@ -343,7 +343,10 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     }
     // Couples have no potential: the inertia of the symmetric part says nothing about stability.
     const bool detects = !settings_.dynamic && settings_.bifurcation != Bifurcation::off && potential.scene().moments.empty();
-    if (detects && stable && mayPassCritical(report) && located_ <= state.time) {
+    // To look for what only indefinite Hessians hint at costs some solves of the step: of a large scene that is for those who ask.
+    const bool asks = settings_.bifurcation != Bifurcation::locate || potential.elements().edges() <= 20000;
+    const bool passed = report.first_negative_pivots > 0 || (asks && mayPassCritical(report));
+    if (detects && stable && passed && located_ <= state.time) {
       bool moved = false;
       const State before = state;
       PetscCall(locate(state, step, &moved));
