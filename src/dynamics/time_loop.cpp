@@ -22,6 +22,10 @@ Step TimeLoop::stepOf(const LoopSettings &settings, const State &state, double d
 /// Newton may come to an unstable equilibrium, or pass it and only meet indefinite Hessians.
 static bool mayPassCritical(const NewtonReport &report) { return report.first_negative_pivots > 0 || report.shifts > 0; }
 
+/// Whether to look for what only indefinite Hessians hint at, and behind a critical point for more. It costs some solves of the step: of a large scene that is
+/// for those who ask.
+bool TimeLoop::isThorough() const { return settings_.bifurcation != Bifurcation::locate || solver_.potential().elements().edges() <= 20000; }
+
 /// Stability may be lost within the step: finds where, as often as the way that the run takes loses it, and moves `start` there when the run is to end or to
 /// go on along another branch.
 PetscErrorCode TimeLoop::locate(State &start, const Step &step, bool *moved) {
@@ -60,7 +64,7 @@ PetscErrorCode TimeLoop::locate(State &start, const Step &step, bool *moved) {
       if (leaves) mode_ = std::move(mode);
       *moved = settings_.bifurcation == Bifurcation::stop || leaves;
       if (*moved) start = *point.state;
-      if (*moved || !point.lost) break;
+      if (*moved || !point.lost || !isThorough()) break;
       PetscCall(settle(*point.lost, point.lost->time, &report));
       if (!report.converged) break;
       reach = growth * (part.time - point.load_factor);
@@ -343,9 +347,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     }
     // Couples have no potential: the inertia of the symmetric part says nothing about stability.
     const bool detects = !settings_.dynamic && settings_.bifurcation != Bifurcation::off && potential.scene().moments.empty();
-    // To look for what only indefinite Hessians hint at costs some solves of the step: of a large scene that is for those who ask.
-    const bool asks = settings_.bifurcation != Bifurcation::locate || potential.elements().edges() <= 20000;
-    const bool passed = report.first_negative_pivots > 0 || (asks && mayPassCritical(report));
+    const bool passed = report.first_negative_pivots > 0 || (isThorough() && mayPassCritical(report));
     if (detects && stable && passed && located_ <= state.time) {
       bool moved = false;
       const State before = state;

@@ -93,6 +93,7 @@ private:
   double nextStep(double time, double *landing) const;
   bool adapt(double h, double dt_min, const StepError &error);
   PetscErrorCode locate(State &start, const Step &step, bool *moved);
+  bool isThorough() const;
   PetscErrorCode locateNext(const State &start, const Step &step, CriticalPoint *point, bool *found);
   Guess alongMode(const State &start, const Step &step);
 };
