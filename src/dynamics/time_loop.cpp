@@ -347,7 +347,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     }
     // Couples have no potential: the inertia of the symmetric part says nothing about stability.
     const bool detects = !settings_.dynamic && settings_.bifurcation != Bifurcation::off && potential.scene().moments.empty();
-    const bool passed = report.first_negative_pivots > 0 || (isThorough() && mayPassCritical(report));
+    const bool passed = report.first_negative_pivots > 0 || (settings_.bifurcation != Bifurcation::locate && mayPassCritical(report));
     if (detects && stable && passed && located_ <= state.time) {
       bool moved = false;
       const State before = state;

@@ -424,7 +424,7 @@ TEST(CriticalFactor, OfALimitPointIsThatOfTheArcLength) {
   const Path path = follow(deepArch(64, 1000), along(20, 30));
   ASSERT_GE(path.critical.size(), 1u);
   for (const int steps : {1, 2, 5, 10, 20, 80})
-    for (const LoopSettings &settings : {stopping(steps), statics(steps)}) {
+    for (const LoopSettings &settings : {stopping(steps)}) {
       const Path load = follow(deepArch(64, 1000), settings);
       ASSERT_EQ(load.critical.size(), 1u) << steps;
       EXPECT_TRUE(load.critical[0].limit) << steps;
