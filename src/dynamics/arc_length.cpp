@@ -212,6 +212,16 @@ PetscErrorCode ArcLength::begin(const State &state, Point *direction) {
   PetscFunctionReturn(0);
 }
 
+/// Motions at the iterate that cost next to nothing: of stiffness below `little` of the softest bending, of either sign.
+PetscErrorCode ArcLength::countNeutral(double little, int *count) {
+  PetscFunctionBeginUser;
+  int low, high;
+  PetscCall(solver_.inertiaAtIterate(&low, -little));
+  PetscCall(solver_.inertiaAtIterate(&high, little));
+  *count = low - high;
+  PetscFunctionReturn(0);
+}
+
 /// Where a motion costs nothing, solves the start of a step and its tangent again, and what follows, to a sharper tolerance: a turn about an axis that costs
 /// nothing in equilibrium has a stiffness of the residual, which may be larger than what holds it and of the other sign. Then steps go along it.
 PetscErrorCode ArcLength::refine(State &state, Point *direction, bool *refined) {
@@ -219,10 +229,9 @@ PetscErrorCode ArcLength::refine(State &state, Point *direction, bool *refined) 
   PetscFunctionBeginUser;
   PetscCall(begin(state, direction));
   if (negative_ < 0) PetscFunctionReturn(0);
-  int low, high;
-  PetscCall(solver_.inertiaAtIterate(&low, -little));
-  PetscCall(solver_.inertiaAtIterate(&high, little));
-  if (low <= high) PetscFunctionReturn(0);
+  int neutral;
+  PetscCall(countNeutral(little, &neutral));
+  if (neutral <= 0) PetscFunctionReturn(0);
   sharpness_ = 1e-2;
   PetscCall(correct(state.time, *direction, 0, refined));
   if (!*refined) PetscFunctionReturn(0);
@@ -239,10 +248,9 @@ PetscErrorCode ArcLength::refuseFreeStart(const State &state) {
   PetscFunctionBeginUser;
   Point direction;
   PetscCall(begin(state, &direction));
-  int low, high;
-  PetscCall(solver_.inertiaAtIterate(&low, -little));
-  PetscCall(solver_.inertiaAtIterate(&high, little));
-  if (low <= high) PetscFunctionReturn(0);
+  int neutral;
+  PetscCall(countNeutral(little, &neutral));
+  if (neutral <= 0) PetscFunctionReturn(0);
   std::ostringstream message;
   message << "the path cannot start at load factor " << state.time << ": without loads a rod is free to move, as one that hangs from one pin is; hold it by a "
              "clamp or a second pin, or use -continuation load";

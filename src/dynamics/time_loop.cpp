@@ -22,9 +22,10 @@ Step TimeLoop::stepOf(const LoopSettings &settings, const State &state, double d
 /// Newton may come to an unstable equilibrium, or pass it and only meet indefinite Hessians.
 static bool mayPassCritical(const NewtonReport &report) { return report.first_negative_pivots > 0 || report.shifts > 0; }
 
-/// Whether to look for what only indefinite Hessians hint at, and behind a critical point for more. It costs some solves of the step: of a large scene that is
-/// for those who ask.
-bool TimeLoop::isThorough() const { return settings_.bifurcation != Bifurcation::locate || solver_.potential().elements().edges() <= 20000; }
+/// Whether to look behind a critical point for more. It costs some solves of the step.
+bool TimeLoop::isThorough() const {
+  return settings_.bifurcation != Bifurcation::locate || solver_.potential().elements().edges() <= most_searched_edges;
+}
 
 /// Stability may be lost within the step: finds where, as often as the way that the run takes loses it, and moves `start` there when the run is to end or to
 /// go on along another branch.

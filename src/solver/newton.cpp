@@ -690,7 +690,7 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
   lost_.clear();
   PetscCall(writeIterate(x_));
   // From a saddle the way down may be long, and shorter load steps begin at the same one; of fine rods they are still the cheaper way.
-  int limits = report_.escapes > 0 && patience_ == 0 && potential_->elements().edges() <= 20000 ? limits_from_saddle : 1;
+  int limits = report_.escapes > 0 && patience_ == 0 && potential_->elements().edges() <= most_searched_edges ? limits_from_saddle : 1;
   do {
     spent_ = report_.iterations;
     PetscCall(SNESSolve(snes_, nullptr, x_));

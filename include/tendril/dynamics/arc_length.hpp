@@ -58,6 +58,7 @@ private:
   PetscErrorCode correctAt(double factor, bool *converged);
   PetscErrorCode iterate(const std::function<double(const Point &moved, const Point &residual, const Point &load)> &constraint, double start, bool *converged);
   PetscErrorCode begin(const State &state, Point *direction);
+  PetscErrorCode countNeutral(double little, int *count);
   PetscErrorCode refuseFreeStart(const State &state);
   PetscErrorCode refine(State &state, Point *direction, bool *refined);
   PetscErrorCode step(const State &state, double length, bool *converged, const Point *along = nullptr);

@@ -16,6 +16,7 @@ struct BranchPoint {
   int unstable = 0;     ///< motions in which it is no minimum; those that cost nothing are left out
   bool found = false;   ///< whether Newton came to one, and near
 };
+
 struct CriticalPoint {
   double load_factor = 0;
   std::optional<State> state; ///< equilibrium there

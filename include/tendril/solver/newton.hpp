@@ -48,6 +48,9 @@ enum class Seek { minimum, equilibrium };
 /// an axis, say.
 constexpr double regular_lift = 1e-7;
 
+/// Edges of the largest scene that statics spend more solves on than its answer takes: on a long way down from a saddle, or to list all critical loads.
+constexpr int most_searched_edges = 20000;
+
 /// Where Newton begins instead of at the start of a step.
 struct Guess {
   Planes unknowns;    ///< displacements and spins since the start
