@@ -305,7 +305,7 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
       }
     };
     bool settled = false; // what more iterations would not change
-    for (int start = 0; start < 2 && !done; ++start) {
+    for (int start = 0; start < 2 && !done && (start == 0 || settled || definite); ++start) {
       Planes room(slot_size, dofs.slots(rods_));
       room.setOrigin(dofs.rods()[rods_.begin].first_slot);
       Probe w{room, room, room}, x = w, p = w;
@@ -315,7 +315,7 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
       settled = false;
       for (int k = 0; k < 100 && !settled; ++k) {
         for (int r = rods_.begin; r < rods_.end && k > 0; ++r)
-          if (negative[r] > 0) improve(e.rods[r], w, x, p, std::clamp(k - enough, 1, 3)); // first by inverse iteration, whose mode is smooth
+          if (negative[r] > 0) improve(e.rods[r], w, x, p, start == 0 ? 1 : std::min(k, 3)); // first by inverse iteration, whose modes are smooth
         watch().beat();
         w.stiff = x.soft;
         PetscCall(solveLinear(w.stiff, w.motion));
