@@ -55,9 +55,9 @@ static void goTo(StepSolver &solver, const State &state, Step step) {
 }
 
 /// Whether a motion loses its stiffness towards a critical point: at `there`, which is much nearer to it than `before`, the softest one that is stable has a
-/// small part of what it has at `before`. Where Newton only fails, or jumps, or where a motion costs nothing, none does.
-static PetscErrorCode softens(StepSolver &solver, const Step &step, const BranchPoint &before, const BranchPoint &there, bool *softer) {
-  constexpr double first = 1e-7, grows = 4, highest = 1e12, part = 0.1; // of the softest bending, and of what it was
+/// small `part` of what it has at `before`. Where Newton only fails, or jumps, or where a motion costs nothing, none does.
+static PetscErrorCode softens(StepSolver &solver, const Step &step, const BranchPoint &before, const BranchPoint &there, double part, bool *softer) {
+  constexpr double first = 1e-7, grows = 4, highest = 1e12; // of the softest bending
   PetscFunctionBeginUser;
   int softest, count; // motions that cost nothing are counted in both
   double stiffness = first;
@@ -79,8 +79,13 @@ PetscErrorCode criticalMode(StepSolver &solver, const CriticalPoint &point, Step
   PetscFunctionReturn(0);
 }
 
+/// Whether two points may be of one branch: before a limit point a rod moves by the root of the interval; beyond it, Newton jumps.
+static bool areNear(const BranchPoint &a, const BranchPoint &b, double width) {
+  return distanceBetween(a.state, b.state) <= std::sqrt(std::abs(a.parameter - b.parameter) / width);
+}
+
 /// Bisection. Steps begin at `base`, the last point that is not within `aside` of the critical one, where the Hessian is nearly singular and Newton strays.
-static PetscErrorCode bisect(const Follow &follow, BranchPoint *low, BranchPoint *base, double high, double interval, double aside) {
+static PetscErrorCode bisect(const Follow &follow, BranchPoint *low, BranchPoint *base, double high, double interval, double aside, double width) {
   PetscFunctionBeginUser;
   *base = *low;
   while (high - low->parameter > interval) {
@@ -88,9 +93,10 @@ static PetscErrorCode bisect(const Follow &follow, BranchPoint *low, BranchPoint
     if (middle <= low->parameter || middle >= high) break;
     BranchPoint point;
     PetscCall(follow(*base, middle, &point));
-    if (!point.found && base->parameter != low->parameter) PetscCall(follow(*low, middle, &point)); // towards a limit point, the nearest start is best
+    auto goesOn = [&] { return point.found && areNear(*low, point, width); };
+    if (!goesOn() && base->parameter != low->parameter) PetscCall(follow(*low, middle, &point)); // towards a limit point, the nearest start is best
     // What cannot be found counts as beyond: past a limit point there is nothing near to converge to.
-    if (point.found && point.unstable == low->unstable) {
+    if (goesOn() && point.unstable == low->unstable) {
       *low = point;
       if (high - middle > aside) *base = point;
     } else
@@ -105,7 +111,7 @@ PetscErrorCode locateCritical(StepSolver &solver, const Step &step, const Follow
   PetscFunctionBeginUser;
   *found = false;
   const Doing here([](std::ostream &out) { out << "a critical load is searched for"; });
-  const double start = low.parameter, end = high, aside = std::max(part * (high - low.parameter), 1e-5 * scale);
+  const double start = low.parameter, end = high, width = end - start, aside = std::max(part * width, 1e-5 * scale);
   double last = std::nan(""); // what the round before found
   bool ahead = false;         // whether the branch was found beyond
   BranchPoint before, beyond;
@@ -118,9 +124,9 @@ PetscErrorCode locateCritical(StepSolver &solver, const Step &step, const Follow
       high = end;
       return follow(low, end, &beyond);
     };
-    PetscCall(bisect(follow, &low, &base, high, interval * scale, aside));
+    PetscCall(bisect(follow, &low, &base, high, interval * scale, aside, width));
     if (std::abs(low.state.time - last) <= agreement * std::abs(last)) {
-      if (low.parameter > start) PetscCall(softens(solver, step, before, low, found));
+      if (low.parameter > start) PetscCall(softens(solver, step, before, low, 3 * std::sqrt(interval * scale / aside), found)); // the root is that of limit points
       if (!*found && !ahead) break;
       if (!*found) {
         PetscCall(goOn());

@@ -406,6 +406,18 @@ TEST(CriticalFactor, IsNoneWhereNewtonOnlyFails) {
   for (const int steps : {1, 2, 5, 20, 36}) EXPECT_TRUE(follow(scene, statics(steps)).critical.empty()) << steps;
 }
 
+/// The other branch of an imperfect column turns back near the critical load of the perfect one. The way from the start does not lead there.
+TEST(CriticalFactor, IsNoneOfAnImperfectColumn) {
+  for (const double aside : {1e-5, 1e-4})
+    for (const double stiffer : {1.0, 1.3}) {
+      Scene scene = column(32, 6);
+      scene.rods[0].material.flexural_stiffness = {1, stiffer};
+      scene.rods[0].material.axial_stiffness = 1e5;
+      scene.forces[0].force += Vec3(0, aside, 2 * aside);
+      for (const int steps : {1, 3, 10, 20}) EXPECT_TRUE(follow(scene, statics(steps)).critical.empty()) << aside << " " << stiffer << " " << steps;
+    }
+}
+
 TEST(ArcLength, RefusesARodThatIsFreeToSwingWithoutLoads) {
   Scene scene = clampedScene(straightRod(20));
   scene.supports = {hold(scene, 0, 0, Support::Kind::pin)};
