@@ -1,7 +1,8 @@
 /// bench_step: what whole Newton steps cost, without output.
 ///
 /// Runs the time loop of tendril, several times from the same state, and prints one row: microseconds per edge and Newton iteration, milliseconds
-/// per step, memory per edge; then how the time divides among the parts of a step. Without -scene, straight cantilevers let go under gravity:
+/// per step, memory per edge, an iteration in units of LAPACK's dpbtrf and dpbtrs on bands of as many edges, in turn with the runs; then how the time
+/// divides among the parts of a step. Without -scene, straight cantilevers let go under gravity:
 ///
 ///     clamp |=====o=====o=====o ... o   -bench_rods of them side by side, -bench_edges of 1 cm each
 ///
@@ -150,10 +151,12 @@ struct Measured {
   int rods, edges;
   StepsTaken taken;       ///< steps and iterations; they are the same in every run
   double fastest, median; ///< seconds of a run
+  double lapack = HUGE_VAL; ///< seconds of dpbtrf and dpbtrs for all edges, fastest
   double bytes_per_edge;
   std::vector<Part> parts;
 
   double perEdge(double seconds) const { return 1e6 * seconds / (double(edges) * taken.newton_iterations); }
+  double perLapack() const { return fastest / (taken.newton_iterations * lapack); }
   double perStep(double seconds) const { return 1e3 * seconds / taken.steps; }
 };
 
@@ -169,7 +172,12 @@ PetscErrorCode measure(const Request &request, Measured *m) {
   PetscCall(refuseUnknownOptions());
   m->rods = int(simulation.scene.rods.size());
   m->edges = 0;
-  for (const Rod &rod : simulation.scene.rods) m->edges += rod.edges();
+  int longest = 0;
+  for (const Rod &rod : simulation.scene.rods) {
+    m->edges += rod.edges();
+    longest = std::max(longest, rod.edges());
+  }
+  LapackBand band(longest);
   LoopSettings first = settings;
   first.t_end = settings.dt;
   PetscCall(takeSteps(simulation, first, &m->taken));
@@ -178,6 +186,9 @@ PetscErrorCode measure(const Request &request, Measured *m) {
   for (PetscInt k = 0; k < request.repeats; ++k) {
     PetscCall(takeSteps(simulation, settings, &m->taken));
     seconds.push_back(m->taken.seconds);
+    const double lapack = band.factorAndSolve();
+    PetscCheck(lapack > 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "dpbtrf or dpbtrs failed");
+    m->lapack = std::min(m->lapack, lapack * m->edges / longest);
   }
   std::sort(seconds.begin(), seconds.end());
   m->fastest = seconds.front();
@@ -192,6 +203,7 @@ void print(const Measured &m) {
   std::printf("%8s %9s %7s %11s %9s | %10s %14s | %8s %8s | edge\n", "", "", "", "", "", "fastest", "median", "fastest", "median");
   std::printf("%8d %9d %7d %11d %9d | %10.3f %14.3f | %8.4g %8.4g | %.0f\n\n", m.rods, m.edges, m.taken.steps, m.taken.newton_iterations, m.taken.rejected,
               m.perEdge(m.fastest), m.perEdge(m.median), m.perStep(m.fastest), m.perStep(m.median), m.bytes_per_edge);
+  std::printf("an iteration is %.3f times dpbtrf and dpbtrs\n\n", m.perLapack());
   double total = 0;
   for (const Part &part : m.parts) total += part.seconds;
   std::printf("parts of the fastest of as many runs with PETSc's log:\n");
@@ -205,12 +217,12 @@ void addRow(const std::string &path, const std::string &scene, const Measured &m
   std::ofstream file(path, std::ios::app);
   if (!file) throw SceneError("option -bench_csv: '" + path + "' cannot be written");
   if (fresh) {
-    file << "scene,rods,edges,steps,newton_iterations,rejected_steps,us_fastest,us_median,step_ms_fastest,step_ms_median,bytes_per_edge";
+    file << "scene,rods,edges,steps,newton_iterations,rejected_steps,us_fastest,us_median,step_ms_fastest,step_ms_median,bytes_per_edge,per_lapack";
     for (const Part &part : m.parts) file << ",us_" << part.name;
     file << '\n';
   }
   file << scene << ',' << m.rods << ',' << m.edges << ',' << m.taken.steps << ',' << m.taken.newton_iterations << ',' << m.taken.rejected << ','
-       << m.perEdge(m.fastest) << ',' << m.perEdge(m.median) << ',' << m.perStep(m.fastest) << ',' << m.perStep(m.median) << ',' << m.bytes_per_edge;
+       << m.perEdge(m.fastest) << ',' << m.perEdge(m.median) << ',' << m.perStep(m.fastest) << ',' << m.perStep(m.median) << ',' << m.bytes_per_edge << ',' << m.perLapack();
   for (const Part &part : m.parts) file << ',' << m.perEdge(part.seconds);
   file << '\n';
 }
