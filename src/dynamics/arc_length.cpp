@@ -46,7 +46,7 @@ double ArcLength::size(const Point &p) const { return std::sqrt(std::max(0.0, pr
 /// The largest correction that is little: against what a step, or its load, moves, or against the rounding of the coordinates.
 double ArcLength::allowance(const Point &moved) const {
   const double by_load = std::min(1.0, load_reach_ * std::abs(solver_.potential().step().load_factor));
-  return std::max(solver_.potential().rounding_tolerance * std::max(size(moved), by_load), rounding_);
+  return std::max(solver_.potential().settings.rounding_tolerance * std::max(size(moved), by_load), rounding_);
 }
 
 /// At the end of a step, with its Hessian factored and the tangent there: whether what Newton would still move it by, across the path, is little.
@@ -463,7 +463,7 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     if (!little) {
       std::ostringstream message;
       message << "step along the path at load factor " << state.time << " is lost in rounding: Newton would still move it by " << left_
-              << " of the length, it moves " << size(last_) << " (-rounding_tolerance " << potential.rounding_tolerance << "); use fewer edges" << imbalance();
+              << " of the length, it moves " << size(last_) << " (-rounding_tolerance " << potential.settings.rounding_tolerance << "); use fewer edges" << imbalance();
       failure_ = message.str();
       PetscFunctionReturn(0);
     }

@@ -9,10 +9,7 @@ PetscErrorCode Simulation::setUp(Scene scene_to_run, const LoopSettings &setting
   PetscCall(dofs.setUp(scene));
   elements = std::make_unique<Elements>(scene, dofs);
   potential = std::make_unique<IncrementalPotential>(scene, dofs, *elements, settings.dynamic);
-  potential->retraction = settings.retraction;
-  potential->rounding_tolerance = settings.rounding_tolerance;
-  potential->line_search = settings.line_search;
-  potential->quasi_newton = settings.quasi_newton;
+  potential->settings = settings.solve;
   PetscCall(solver.setUp(*potential, !settings.dynamic && settings.continuation == Continuation::arclength ? Coupling::load : Coupling::none));
   state = initialState(scene, *elements);
   PetscFunctionReturn(0);

@@ -439,11 +439,11 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
     option("load_steps", std::to_string(std::lround(1 / dt)));
   }
   option("stretch", settings.mixed ? "mixed" : "primal");
-  option("retraction", settings.retraction == RetractionKind::length ? "length" : "additive");
+  option("retraction", settings.solve.retraction == RetractionKind::length ? "length" : "additive");
   option("hessian", settings.hessian == HessianKind::exact ? "exact" : "gauss_newton");
-  option("line_search", settings.line_search == LineSearchKind::energy ? "energy" : settings.line_search == LineSearchKind::wolfe ? "wolfe" : "residual");
-  option("quasi_newton", settings.quasi_newton);
-  option("rounding_tolerance", settings.rounding_tolerance);
+  option("line_search", settings.solve.line_search == LineSearchKind::energy ? "energy" : settings.solve.line_search == LineSearchKind::wolfe ? "wolfe" : "residual");
+  option("quasi_newton", settings.solve.quasi_newton);
+  option("rounding_tolerance", settings.solve.rounding_tolerance);
 
   add(Kind::scene, "gravity", textOf(scene.gravity));
   if (!scene.rotation.angular_velocity.isZero(0))

@@ -200,11 +200,11 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   const Quantity quantity = of == "tip" ? Quantity::tip : of == "energy" ? Quantity::energy : Quantity::position;
   if (texts.has("-accuracy_of")) o->accuracy_of = quantity;
   if (texts.has("-accuracy")) o->accuracy = {texts.number("-accuracy"), quantity};
-  o->loop.rounding_tolerance = texts.number("-rounding_tolerance");
-  o->loop.retraction = texts.word("-retraction") == "additive" ? RetractionKind::additive : RetractionKind::length;
+  o->loop.solve.rounding_tolerance = texts.number("-rounding_tolerance");
+  o->loop.solve.retraction = texts.word("-retraction") == "additive" ? RetractionKind::additive : RetractionKind::length;
   const std::string search = texts.word("-line_search");
-  o->loop.line_search = search == "wolfe" ? LineSearchKind::wolfe : search == "residual" ? LineSearchKind::residual : LineSearchKind::energy;
-  o->loop.quasi_newton = texts.integer("-quasi_newton");
+  o->loop.solve.line_search = search == "wolfe" ? LineSearchKind::wolfe : search == "residual" ? LineSearchKind::residual : LineSearchKind::energy;
+  o->loop.solve.quasi_newton = texts.integer("-quasi_newton");
   o->loop.mixed = texts.word("-stretch") == "mixed";
   o->loop.hessian = texts.word("-hessian") == "exact" ? HessianKind::exact : HessianKind::gauss_newton;
   for (const Key *key : rodOverrides())
@@ -340,11 +340,11 @@ std::string writeOptionsFile(const std::string &path, const Options &o, const Pr
     put("accuracy", o.accuracy->tolerance);
     put("accuracy_of", o.accuracy->of == Quantity::tip ? "tip" : o.accuracy->of == Quantity::energy ? "energy" : "position");
   }
-  put("rounding_tolerance", o.loop.rounding_tolerance);
+  put("rounding_tolerance", o.loop.solve.rounding_tolerance);
   constexpr const char *searches[] = {"energy", "wolfe", "residual"};
-  put("line_search", searches[int(o.loop.line_search)]);
-  put("quasi_newton", o.loop.quasi_newton);
-  put("retraction", o.loop.retraction == RetractionKind::length ? "length" : "additive");
+  put("line_search", searches[int(o.loop.solve.line_search)]);
+  put("quasi_newton", o.loop.solve.quasi_newton);
+  put("retraction", o.loop.solve.retraction == RetractionKind::length ? "length" : "additive");
   put("stretch", o.loop.mixed ? "mixed" : "primal");
   put("hessian", o.loop.hessian == HessianKind::exact ? "exact" : "gauss_newton");
   out << YAML::Key << "rods" << YAML::Value << YAML::BeginSeq;

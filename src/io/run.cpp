@@ -3,8 +3,9 @@
 #include "tendril/dynamics/arc_length.hpp"
 #include "tendril/dynamics/simulation.hpp"
 #include "tendril/energy/widest_angle.hpp"
-#include "tendril/io/accuracy.hpp"
+#include "tendril/accuracy/accuracy.hpp"
 #include "tendril/io/checkpoint.hpp"
+#include "tendril/io/estimate_writer.hpp"
 #include "tendril/io/keys.hpp"
 #include "tendril/io/option_files.hpp"
 #include "tendril/io/options.hpp"
@@ -193,10 +194,8 @@ PetscErrorCode tellError(const Prepared &prepared, double rounding_error, const 
 }
 
 void tellTimeError(const Diagnostics &last, const Options &o, Progress &progress) {
-  const std::optional<double> error = accumulatedTimeError(last);
-  if (!error) return progress.say("no estimate: the diagnostics have no column error_estimate, in which an integrator leaves its error in time");
   std::ostringstream line;
-  const double with_rounding = *error + last.rounding_error;
+  const double with_rounding = last.error_estimate + last.rounding_error;
   line << "estimated error: " << std::setprecision(3) << with_rounding
        << " rod lengths in time, the local errors of all steps and their rounding errors added up; that of the edges is not in it";
   progress.say(line.str());

@@ -93,61 +93,13 @@ const std::vector<std::string> &TrajectoryWriter::derivedFieldNames() {
   return names;
 }
 
-const std::vector<std::string> &Diagnostics::names() {
-  static const std::vector<std::string> names{"time",
-                                              "dt",
-                                              "kinetic",
-                                              "stretch",
-                                              "bend",
-                                              "twist",
-                                              "gravity",
-                                              "dissipated",
-                                              "newton_iterations",
-                                              "line_search_trials",
-                                              "negative_pivots",
-                                              "rejected_steps",
-                                              "wall_seconds",
-                                              "error_estimate",
-                                              "rejected_iterations",
-                                              "rounding_error",
-                                              "work_loads",
-                                              "work_supports"};
-  return names;
-}
-
-const std::vector<std::string> &Diagnostics::units() {
-  static const std::vector<std::string> units{"s", "s", "J", "J", "J", "J", "J", "J", "1", "1", "1", "1", "s", "1", "1", "1", "J", "J"};
-  return units;
-}
-
-std::vector<double> Diagnostics::values() const {
-  return {time,
-          dt,
-          energy.kinetic,
-          energy.stretch,
-          energy.bend,
-          energy.twist,
-          energy.gravity,
-          dissipated,
-          double(newton_iterations),
-          double(line_search_trials),
-          double(negative_pivots),
-          double(rejected_steps),
-          wall_seconds,
-          error_estimate,
-          double(rejected_iterations),
-          rounding_error,
-          work.loads,
-          work.supports};
-}
-
 TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene, const Elements &elements, const Provenance &provenance,
                                    const std::set<std::string> &wanted, bool dynamic)
     : scene_(scene), elements_(elements), dynamic_(dynamic), folder_(folder), rods_(elements.rods.size()), vertices_(elements.vertices()),
       edges_(elements.edges()), csv_(folder + "/diagnostics.csv"), file_(Hdf5File::create(folder + "/trajectory.h5")) {
-  for (const std::string &name : Diagnostics::names()) {
+  for (const DiagnosticsColumn &column : diagnosticsColumns()) {
     if (!csv_rows_.empty()) csv_rows_ += ',';
-    csv_rows_ += name;
+    csv_rows_ += column.name;
   }
   csv_rows_ += '\n';
   writeHeader(scene, elements, provenance);
@@ -166,10 +118,11 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
   file_.createGroup("summary");
   writeSummary(emptySummary(scene));
   file_.createGroup("diagnostics");
-  for (std::size_t k = 0; k < Diagnostics::names().size(); ++k) {
-    const std::string path = "diagnostics/" + Diagnostics::names()[k];
+  for (const DiagnosticsColumn &column : diagnosticsColumns()) {
+    const std::string path = "diagnostics/" + column.name;
     diagnostics_.push_back(std::make_unique<Hdf5Series>(file_, path, std::vector<hsize_t>{}));
-    file_.writeAttribute(path, "unit", !dynamic && k < 2 ? "1" : Diagnostics::units()[k]); // in statics time is the load factor
+    const bool is_load_factor = !dynamic && (column.name == "time" || column.name == "dt");
+    file_.writeAttribute(path, "unit", is_load_factor ? "1" : column.unit);
   }
   file_.createGroup("critical");
   critical_ = std::make_unique<Hdf5Series>(file_, "critical/load_factor", std::vector<hsize_t>{});
@@ -331,12 +284,12 @@ void TrajectoryWriter::writeFrame(const State &state) {
 }
 
 void TrajectoryWriter::writeDiagnostics(const Diagnostics &row) {
-  const std::vector<double> values = row.values();
   char text[32];
-  for (std::size_t k = 0; k < values.size(); ++k) {
-    diagnostics_[k]->append(&values[k]);
+  for (std::size_t k = 0; k < diagnostics_.size(); ++k) {
+    const double value = diagnosticsColumns()[k].value(row);
+    diagnostics_[k]->append(&value);
     if (k) csv_rows_ += ',';
-    csv_rows_.append(text, std::to_chars(text, text + sizeof text, values[k]).ptr); // as many digits as bring the number back
+    csv_rows_.append(text, std::to_chars(text, text + sizeof text, value).ptr); // as many digits as bring the number back
   }
   csv_rows_ += '\n';
 }

@@ -227,7 +227,7 @@ PetscErrorCode NewtonSolver::evaluate(Vec x, Vec f) {
 
 /// Whether the next iteration may do with the factorisation that there is.
 bool NewtonSolver::sharesFactor() const {
-  return age_ > 0 && age_ < potential_->quasi_newton && !renew_ && !circulatory_ &&
+  return age_ > 0 && age_ < potential_->settings.quasi_newton && !renew_ && !circulatory_ &&
          std::none_of(work_->moving.begin() + rods_.begin, work_->moving.begin() + rods_.end, [](char moving) { return moving; });
 }
 
@@ -505,7 +505,7 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
   };
   // Where the symmetric part is indefinite, couples have nothing that an equilibrium would minimise.
   const bool free = seek_ == Seek::equilibrium || (potential_->step().isStatic() && circulatory_ && circulatory_->acts(r) && work_->negative[r] > 0);
-  const LineSearchKind kind = potential_->line_search;
+  const LineSearchKind kind = potential_->settings.line_search;
   enum class Length { good, too_long, too_short };
   auto judge = [&](double length) {
     if (!std::isfinite(after.value)) return Length::too_long;
@@ -608,7 +608,7 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   double shortest = 1;
   bool accepted = true;
   std::vector<double> before; // the gradient, where secants are wanted
-  if (potential_->quasi_newton > 1) {
+  if (potential_->settings.quasi_newton > 1) {
     const double *values;
     PetscCall(VecGetArrayRead(f, &values));
     before.assign(values, values + potential_->dofs().unknowns(rods_));
@@ -814,7 +814,7 @@ void NewtonSolver::predict(const State &start) {
   const Combination guess = rule ? rule->guess : Combination().add(potential_->step().dt, start);
   // Backward Euler's velocities are the last step's chords; others are tangents of the motion, and say nothing of lengths at that accuracy.
   const RetractionKind along = rule && rule->half ? RetractionKind::additive : rule ? RetractionKind::kept : RetractionKind::continued;
-  const RetractionKind kind = potential_->retraction == RetractionKind::length ? along : potential_->retraction;
+  const RetractionKind kind = potential_->settings.retraction == RetractionKind::length ? along : potential_->settings.retraction;
   for (int r = rods_.begin; r < rods_.end; ++r) {
     const RodRange &rod = dofs.rods()[r];
     for (int i = 0; i < rod.vertices; ++i) work_->increment.setVector(0, rod.slot(i), freedom[rod.slot(i)] * guess.atVertex(rod.first_vertex + i));

@@ -1,6 +1,6 @@
 #include "tendril/solver/step_solver.hpp"
 
-#include "tendril/dynamics/coarse.hpp"
+#include "tendril/solver/coarse.hpp"
 
 #include <algorithm>
 

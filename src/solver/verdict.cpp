@@ -66,7 +66,7 @@ PetscErrorCode NewtonSolver::findLoadReach() {
 /// Whether the last increment of a rod is little: against what the step or its loads move, in displacement and in energy; or against the rounding of the
 /// coordinates, for a rod at rest. `size`: of the increment.
 bool NewtonSolver::isLittle(int r, double *size) {
-  const double tolerance = potential_->rounding_tolerance;
+  const double tolerance = potential_->settings.rounding_tolerance;
   const IncrementalPotential::RodEnergy &energy = energyAtIterate(r);
   const double cost = std::abs(work_->standstill[r].energy);
   *size = sizeOf(r, work_->increment);
@@ -127,7 +127,7 @@ NewtonSolver::Verdict NewtonSolver::judge(int r, double rtol) {
 /// out.
 bool NewtonSolver::isBalanced(int r, double rtol) const {
   const IncrementalPotential::Residual &residual = work_->residual[r];
-  return excess(residual, rtol) <= 1 || (isAtNoise(residual, rtol) && std::max(residual.force_floor, residual.moment_floor) <= potential_->rounding_tolerance);
+  return excess(residual, rtol) <= 1 || (isAtNoise(residual, rtol) && std::max(residual.force_floor, residual.moment_floor) <= potential_->settings.rounding_tolerance);
 }
 
 /// At an equilibrium with its Hessian factored: whether what is left of every rod is little.
@@ -166,7 +166,7 @@ std::string NewtonSolver::roundingMessage(int r, double size) const {
   const std::string imbalance = imbalanceOf(*potential_, r, asked());
   text << std::setprecision(3) << "rod '" << rod.name << "' is lost in rounding: " << imbalance << (imbalance.empty() ? "" : ", and not falling any more; ")
        << "Newton would still move it by " << size << " of its length, the step moves it by " << movedBy(r) << " (-rounding_tolerance "
-       << potential_->rounding_tolerance << ")";
+       << potential_->settings.rounding_tolerance << ")";
   if (longest > 100 * shortest)
     text << "; edge " << edge << " is " << shortest << " m long, the longest " << longest
          << " m: take one of its vertices away, or use edges of more even length";

@@ -1,6 +1,6 @@
 /// Energies under couples at an end, of which half an edge has no cell.
 #include "tendril/energy/derived.hpp"
-#include "tendril/io/accuracy.hpp"
+#include "tendril/accuracy/accuracy.hpp"
 #include "tendril/io/scene_reader.hpp"
 
 #include "support/rods.hpp"

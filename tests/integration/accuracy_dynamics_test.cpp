@@ -1,5 +1,5 @@
 /// Edges and steps chosen in dynamics: the true errors of the runs that they make.
-#include "tendril/io/samples.hpp"
+#include "tendril/accuracy/samples.hpp"
 #include "tendril/io/scene_reader.hpp"
 
 #include "support/files.hpp"

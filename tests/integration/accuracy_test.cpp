@@ -1,5 +1,5 @@
 /// Estimated errors against those to exact solutions, and the edges chosen by them.
-#include "tendril/io/accuracy.hpp"
+#include "tendril/accuracy/accuracy.hpp"
 #include "tendril/io/scene_reader.hpp"
 
 #include "support/files.hpp"

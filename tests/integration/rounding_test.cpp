@@ -352,7 +352,7 @@ TEST(Rounding, DoesNotLetSoftDirectionsDrift) {
 
 TEST(Rounding, IsToldWhereItHidesTheAnswer) {
   LoopSettings settings = statics();
-  settings.rounding_tolerance = 1e-16; // no answer is so good
+  settings.solve.rounding_tolerance = 1e-16; // no answer is so good
   Scene scene = cantilever(even(20000), Vec3(0, 0.3, 0));
   scene.rods[0].name = "wire";
   const Outcome out = run(scene, settings);
@@ -360,7 +360,7 @@ TEST(Rounding, IsToldWhereItHidesTheAnswer) {
   for (const char *words : {"rod 'wire'", "rounding", "20000 edges", "fewer"}) EXPECT_NE(out.failure.find(words), std::string::npos) << out.failure;
   EXPECT_EQ(out.failure.find("iteration limit"), std::string::npos) << out.failure; // seen to be hopeless before
   LoopSettings steps = dynamics(0.01, 0.1);
-  steps.rounding_tolerance = 1e-16;
+  steps.solve.rounding_tolerance = 1e-16;
   const Outcome falling = run(steelRod(100000, true), steps);
   EXPECT_FALSE(falling.finished);
   EXPECT_NE(falling.failure.find("lost in rounding"), std::string::npos) << falling.failure;

@@ -115,9 +115,9 @@ TEST(Newton, ComesToTheSameAnswerByEveryWay) {
     for (std::size_t v = 0; v < x.size(); ++v) EXPECT_LT((x[v] - moved[v]).norm(), 2e-6) << name << " " << v; // 1e-6 of displacements of 0.1, twenty times
     return iterations;
   };
-  const int wolfe = compare("wolfe", [](LoopSettings &s) { s.line_search = LineSearchKind::wolfe; });
-  compare("residual", [](LoopSettings &s) { s.line_search = LineSearchKind::residual; });
-  const int secants = compare("secants", [](LoopSettings &s) { s.quasi_newton = 4; });
+  const int wolfe = compare("wolfe", [](LoopSettings &s) { s.solve.line_search = LineSearchKind::wolfe; });
+  compare("residual", [](LoopSettings &s) { s.solve.line_search = LineSearchKind::residual; });
+  const int secants = compare("secants", [](LoopSettings &s) { s.solve.quasi_newton = 4; });
   const int gauss_newton = compare("Gauss-Newton", [](LoopSettings &s) { s.hessian = HessianKind::gauss_newton; });
   EXPECT_LE(wolfe, usual + 5);
   EXPECT_GT(secants, usual); // or the Hessian was exact

@@ -134,9 +134,7 @@ TEST(Trajectory, EveryFieldHasAUnitAndAPlace) {
     EXPECT_NE(written.attribute("state/" + name, "unit"), "(none)") << name;
     EXPECT_NE(written.attribute("state/" + name, "place"), "(none)") << name;
   }
-  EXPECT_EQ(Diagnostics::units().size(), Diagnostics::names().size());
-  for (const std::string &name : Diagnostics::names())
-    EXPECT_NE(written.attribute("diagnostics/" + name, "unit"), "(none)") << name;
+  for (const DiagnosticsColumn &column : diagnosticsColumns()) EXPECT_EQ(written.attribute("diagnostics/" + column.name, "unit"), column.unit);
   EXPECT_EQ(written.attribute("state/turns", "place"), "cells");
   EXPECT_EQ(written.attribute("time", "unit"), "s");
 }

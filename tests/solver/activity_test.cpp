@@ -2,7 +2,7 @@
 #include "support/rods.hpp"
 
 #include "tendril/dynamics/arc_length.hpp"
-#include "tendril/io/estimate.hpp"
+#include "tendril/accuracy/estimate.hpp"
 #include "tendril/solver/activity.hpp"
 
 #include <algorithm>

@@ -24,7 +24,7 @@ TEST(Circulatory, DirectionSolvesTheWholeDerivative) {
   Simulation sim;
   LoopSettings settings = statics();
   settings.mixed = false;
-  settings.retraction = RetractionKind::additive;
+  settings.solve.retraction = RetractionKind::additive;
   EXPECT_PETSC(sim.setUp(coupleScene(), settings));
   EXPECT_PETSC(SNESSetTolerances(sim.solver.snes(), 0, 1e-10, 0, 50, PETSC_MAX_INT));
   TimeLoop loop(sim.solver, settings);

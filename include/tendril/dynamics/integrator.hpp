@@ -4,7 +4,7 @@
 /// accelerations follow from the displacements d (StageRule), and what is left at the end of the step. docs/theory.md has the formulas.
 /// To add one, write a class in one file of dynamics/integrators/ and one line in the list of integrator.cpp.
 
-#include "tendril/dynamics/stage.hpp"
+#include "tendril/state/stage.hpp"
 #include "tendril/solver/step_solver.hpp"
 
 namespace tendril {

@@ -2,7 +2,7 @@
 /// \file prolong.hpp
 /// A state carried to the same rods with twice the edges: from there Newton finds the equilibrium that belongs to it, whatever others there are.
 
-#include "tendril/dynamics/state.hpp"
+#include "tendril/state/state.hpp"
 
 namespace tendril {
 

@@ -3,9 +3,8 @@
 /// Steps through time (dynamics) or load (statics), rejecting what does not converge.
 
 #include "tendril/dynamics/bifurcation.hpp"
+#include "tendril/dynamics/diagnostics.hpp"
 #include "tendril/dynamics/integrator.hpp"
-#include "tendril/energy/work.hpp"
-#include "tendril/io/trajectory.hpp"
 #include "tendril/solver/step_solver.hpp"
 
 #include <cmath>
@@ -36,10 +35,7 @@ struct LoopSettings {
   int arclength_steps = 200;                     ///< most steps along the path
   bool mixed = true;
   HessianKind hessian = HessianKind::exact;
-  RetractionKind retraction = RetractionKind::length;
-  double rounding_tolerance = 1e-3; ///< see IncrementalPotential
-  LineSearchKind line_search = LineSearchKind::energy;
-  int quasi_newton = 1;
+  SolveSettings solve;
 };
 
 /// How a loop is stepping: with the state, all that goes on from step to step.

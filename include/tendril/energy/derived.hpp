@@ -2,7 +2,7 @@
 /// \file derived.hpp
 /// Strains and internal forces and moments of a state, for output: nothing here takes part in a step. docs/theory.md derives the balances.
 
-#include "tendril/dynamics/state.hpp"
+#include "tendril/state/state.hpp"
 
 namespace tendril {
 

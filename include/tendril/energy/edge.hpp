@@ -2,21 +2,9 @@
 /// \file edge.hpp
 /// Energies of one edge: stretch, of either law, and the inertia of its twist over a step.
 
-#include "tendril/energy/bend_twist.hpp"
+#include "tendril/model/strain.hpp"
 
 namespace tendril {
-
-/// Axial strain of an edge: ((l/L)^2 - 1)/2 (`seed`; St. Venant-Kirchhoff in the Green-Lagrange strain) or l/L - 1 (`classical`; Hooke), written so that
-/// small strains keep their digits. The stretch energy is 1/2 k strain^2 L.
-template <class T> T axialStrain(Energy energy, const T &length, const T &inverse_rest_length) {
-  if (energy == Energy::classical) return length * inverse_rest_length - T(1.0);
-  return (length * inverse_rest_length - T(1.0)) * (length * inverse_rest_length + T(1.0)) * T(0.5);
-}
-
-/// L times the derivative of the axial strain by l^2/2 [1/m]: 1/L or 1/l.
-template <class T> T strainSlope(Energy energy, const T &length, const T &inverse_rest_length) {
-  return energy == Energy::classical ? T(T(1.0) / length) : inverse_rest_length;
-}
 
 /// Derivatives of the stretch energy over the edge vector e = l t: gradient = force q with q = slope e (strainSlope), Hessian =
 /// (stiffness/L) q q' + tension slope I, for `classical` I - t t'. In the primal form tension = force = k (strain - rest).

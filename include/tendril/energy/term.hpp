@@ -3,7 +3,8 @@
 /// A term of the incremental potential: its value and its derivatives over the slots of one rod. To add an energy, write one file with a
 /// class derived from Term and add one line to makeTerms (terms.cpp).
 
-#include "tendril/dynamics/stage.hpp"
+#include "tendril/energy/cell.hpp"
+#include "tendril/state/stage.hpp"
 
 #include <memory>
 
@@ -91,13 +92,6 @@ std::unique_ptr<Term> makeBendTwist(const Scene &, const Elements &);
 std::unique_ptr<Term> makeStretch(const Elements &, const AxialLaw &);
 std::unique_ptr<Term> makeInertia(const Scene &, const Elements &);
 std::unique_ptr<Term> makeLoad(const Scene &, const Elements &);
-
-/// Present strains of a cell (or a pack of `count` cells), integrated over it [rad].
-template <class T> std::array<T, 3> presentStrain(const Elements &elements, const Configuration &configuration, int rod, const LooseCell &cell, int count = 1) {
-  const auto [f0, f1] = cellFrames<T>(configuration, cell, count);
-  const CellOf<T> constants = cellOf<T>(elements.cells(), configuration, cell.slot);
-  return elements.measure[rod] == Measure::tan ? cellStrain<Measure::tan>(f0, f1, constants) : cellStrain<Measure::angle>(f0, f1, constants);
-}
 
 /// What an end couple stores in the half edge beyond the last cell, by bending about the first and second director and by twist [J]. That half
 /// turns by moment x compliance, so the couple does twice this work at the end of the rod; the balance of forces is the same with or without it.

@@ -2,7 +2,7 @@
 /// \file widest_angle.hpp
 /// How far neighbouring edges were from each other during a run.
 
-#include "tendril/dynamics/state.hpp"
+#include "tendril/state/state.hpp"
 
 namespace tendril {
 

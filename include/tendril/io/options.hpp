@@ -2,9 +2,8 @@
 /// \file options.hpp
 /// The command line: options of our own, listed by -help and read as text, so that a mistake is told in one line.
 
-#include "tendril/dynamics/time_loop.hpp"
-#include "tendril/io/accuracy.hpp"
-#include "tendril/io/scene_reader.hpp"
+#include "tendril/accuracy/accuracy.hpp"
+#include "tendril/io/trajectory.hpp"
 
 #include <set>
 

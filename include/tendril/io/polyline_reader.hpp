@@ -2,22 +2,11 @@
 /// \file polyline_reader.hpp
 /// Polylines from files.
 
-#include "tendril/geometry/scalar.hpp"
+#include "tendril/model/polyline.hpp"
 
-#include <functional>
 #include <string>
-#include <vector>
 
 namespace tendril {
-
-/// A curve over [0, 1]: vertex i of a polyline of n edges along it stands at i/n.
-using Curve = std::function<Vec3(double)>;
-
-struct Polyline {
-  std::vector<Vec3> points; ///< [m]; the first is not repeated at the end of a closed one
-  bool closed = false;
-  Curve curve; ///< that the points were taken from; empty where there are only points
-};
 
 /// Reads all polylines of a file, by its extension:
 ///   .csv .txt  one point per line, three numbers separated by commas or blanks; `#` begins a comment, an empty line ends a polyline;

@@ -2,7 +2,7 @@
 /// \file trajectory.hpp
 /// Trajectories: one HDF5 file that grows frame by frame (layout in docs/reading_results.md) and the XDMF file by which ParaView reads it.
 
-#include "tendril/energy/work.hpp"
+#include "tendril/dynamics/diagnostics.hpp"
 #include "tendril/io/hdf5.hpp"
 #include "tendril/io/scene_reader.hpp"
 #include "tendril/io/summary.hpp"
@@ -14,23 +14,6 @@
 #include <set>
 
 namespace tendril {
-
-/// One row of /diagnostics and of diagnostics.csv.
-struct Diagnostics {
-  double time = 0, dt = 0;
-  EnergyBudget energy;
-  Work work;             ///< of loads and supports in the step [J]
-  double dissipated = 0; ///< by the step: the fall of the energies, and the work [J]
-  int newton_iterations = 0, line_search_trials = 0, negative_pivots = 0, rejected_steps = 0;
-  double wall_seconds = 0;
-  double rounding_error = 0;   ///< what rounding keeps from the answer, over rod lengths; in dynamics summed over the steps (NewtonReport)
-  int rejected_iterations = 0; ///< Newton iterations of the rejected steps, which newton_iterations leaves out
-  double error_estimate = 0;   ///< errors of all steps so far, each over the rod length, added up; 0 when not computed
-
-  static const std::vector<std::string> &names();
-  static const std::vector<std::string> &units();
-  std::vector<double> values() const;
-};
 
 /// Where a run came from; attributes of the trajectory, and its datasets /scene, /scene_files and /options.
 struct Provenance {

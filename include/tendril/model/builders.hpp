@@ -2,7 +2,7 @@
 /// \file builders.hpp
 /// Shapes a scene may name instead of listing points.
 
-#include "tendril/io/polyline_reader.hpp"
+#include "tendril/model/polyline.hpp"
 #include "tendril/model/scene.hpp"
 
 namespace tendril {

@@ -2,7 +2,7 @@
 /// \file grading.hpp
 /// Where the vertices of a rod stand on the curve it was drawn along: close where it bends strongly, by one map for any number of edges.
 
-#include "tendril/io/polyline_reader.hpp"
+#include "tendril/model/polyline.hpp"
 #include "tendril/model/scene.hpp"
 
 namespace tendril {

@@ -2,8 +2,8 @@
 /// \file scene.hpp
 /// The scene: all that is fixed once set-up is done. Rods, what holds them, what pulls on them. Nothing here changes during a run.
 
-#include "tendril/energy/bend_twist.hpp"
 #include "tendril/model/material.hpp"
+#include "tendril/model/strain.hpp"
 
 #include <stdexcept>
 #include <string>

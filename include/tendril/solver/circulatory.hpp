@@ -10,7 +10,7 @@
 /// 1968, Principles of Structural Stability). That is of rank two for each couple, so that Newton's direction comes from the factored symmetric
 /// part and two more solves a couple, by the formula of Sherman, Morrison and Woodbury, whatever the linear solver.
 
-#include "tendril/dynamics/incremental_potential.hpp"
+#include "tendril/solver/incremental_potential.hpp"
 
 #include <Eigen/Dense>
 #include <functional>

@@ -2,7 +2,7 @@
 /// \file imbalance.hpp
 /// What keeps an iterate from being an answer, in words: for the messages of all that fails.
 
-#include "tendril/dynamics/incremental_potential.hpp"
+#include "tendril/solver/incremental_potential.hpp"
 
 #include <string>
 

@@ -2,7 +2,7 @@
 /// \file newton.hpp
 /// One implicit step by SNES: Newton with the exact Hessian, its inertia read at every factorisation, and the line search `retraction`.
 
-#include "tendril/dynamics/incremental_potential.hpp"
+#include "tendril/solver/incremental_potential.hpp"
 #include "tendril/solver/banded.hpp"
 #include "tendril/solver/circulatory.hpp"
 #include "tendril/solver/imbalance.hpp"

@@ -6,8 +6,6 @@
 #include "tendril/dynamics/simulation.hpp"
 #include "tendril/model/redraw.hpp"
 
-#include <optional>
-
 namespace tendril {
 
 /// As drawn [m].
@@ -66,15 +64,11 @@ Estimate richardson(const Scene &scene, const Answer &coarse, const Answer &fine
 PetscErrorCode estimateError(const Simulation &run, double rounding_error, const std::vector<double> &critical, const Scene &fine, const LoopSettings &settings,
                              Estimate *estimate);
 
+/// Energies that have an estimate of their own, by name.
+inline constexpr std::pair<const char *, double EnergyBudget::*> estimated_energies[] = {
+    {"stretch", &EnergyBudget::stretch}, {"bend", &EnergyBudget::bend}, {"twist", &EnergyBudget::twist}, {"gravity", &EnergyBudget::gravity}};
+
 /// Lines that tell an estimate to a user.
 std::vector<std::string> describe(const Estimate &estimate, const Scene &scene);
-
-/// Adds the group /estimate to a trajectory that is complete: docs/user.md has its layout. \throws SceneError
-void writeEstimate(const std::string &path, const Estimate &estimate);
-
-/// Dynamics: the local errors of all steps, added up, that the integrator leaves in the diagnostics; none when there is no such column.
-std::optional<double> accumulatedTimeError(const Diagnostics &row);
-/// Adds it to a trajectory as the attribute `time_error` of /estimate. \throws SceneError
-void writeTimeError(const std::string &path, double error);
 
 } // namespace tendril

@@ -1,4 +1,4 @@
-#include "tendril/io/accuracy.hpp"
+#include "tendril/accuracy/accuracy.hpp"
 
 #include "tendril/model/alike.hpp"
 #include "tendril/solver/activity.hpp"

@@ -1,4 +1,4 @@
-#include "tendril/model/elements.hpp"
+#include "tendril/layout/elements.hpp"
 
 namespace tendril {
 namespace {

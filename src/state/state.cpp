@@ -1,7 +1,4 @@
-#include "tendril/dynamics/stage.hpp"
-
-#include "tendril/energy/edge.hpp"
-#include "tendril/energy/term.hpp"
+#include "tendril/state/stage.hpp"
 
 namespace tendril {
 
@@ -149,18 +146,6 @@ void carryFrames(const StageRule &rule, const Elements &elements, int r, const C
     }
     reference.setFrame(rod.slot(i), {tangent, director, f.length});
   }
-}
-
-std::vector<double> strainsOf(const Elements &elements, const Configuration &c) {
-  const std::size_t row = strainRow(elements);
-  std::vector<double> strains(4 * row, 0.0);
-  for (const int s : elements.edge_slot) strains[s] = c[Configuration::strain][s];
-  for (int r = 0; r < int(elements.rods.size()); ++r)
-    forCells(elements, r, [&]<class T>(const LooseCell &cell, int count) {
-      const std::array<T, 3> s = presentStrain<T>(elements, c, r, cell, count);
-      for (int k = 0; k < 3; ++k) write(strains.data() + (k + 1) * row + cell.slot, s[k]);
-    });
-  return strains;
 }
 
 Configuration configurationOf(const State &state, const Scene &scene, const Elements &elements, double motion_time) {

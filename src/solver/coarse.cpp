@@ -1,8 +1,8 @@
-#include "tendril/dynamics/coarse.hpp"
+#include "tendril/solver/coarse.hpp"
 
-#include "tendril/dynamics/simulation.hpp"
 #include "tendril/model/redraw.hpp"
 #include "tendril/solver/activity.hpp"
+#include "tendril/solver/step_solver.hpp"
 
 #include <algorithm>
 
@@ -180,17 +180,16 @@ PetscErrorCode solveCoarse(const IncrementalPotential &fine, const State &start,
   Coarse coarse(fine, rods);
   if (!coarse.worth) PetscFunctionReturn(0);
   const Doing here([&](std::ostream &out) { out << "with fewer edges, " << coarse.scene.rods[0].edges() << " of rod '" << coarse.scene.rods[0].name << "'"; });
-  LoopSettings settings;
-  settings.dynamic = false;
-  settings.retraction = fine.retraction;
-  settings.rounding_tolerance = fine.rounding_tolerance;
-  settings.line_search = fine.line_search;
-  settings.quasi_newton = fine.quasi_newton;
-  Simulation sim;
-  PetscCall(sim.setUp(coarse.scene, settings));
-  sim.solver.coarse_first = true;
-  PetscCall(sim.solver.solve(coarse.stateOf(fine, start, *sim.elements), fine.step(), report));
-  if (report->converged) coarse.prolong(fine, *sim.potential, guess);
+  DofMap dofs;
+  PetscCall(dofs.setUp(coarse.scene));
+  const Elements elements(coarse.scene, dofs);
+  IncrementalPotential potential(coarse.scene, dofs, elements, false);
+  potential.settings = fine.settings;
+  StepSolver solver;
+  PetscCall(solver.setUp(potential));
+  solver.coarse_first = true;
+  PetscCall(solver.solve(coarse.stateOf(fine, start, elements), fine.step(), report));
+  if (report->converged) coarse.prolong(fine, potential, guess);
   PetscFunctionReturn(0);
 }
 

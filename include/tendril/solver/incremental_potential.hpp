@@ -4,7 +4,7 @@
 /// Rods that nothing joins are independent of each other: everything is done rod by rod.
 
 #include "tendril/energy/term.hpp"
-#include "tendril/solver/retraction.hpp"
+#include "tendril/state/retraction.hpp"
 
 #include <limits>
 
@@ -14,15 +14,20 @@ namespace tendril {
 /// (strong Wolfe conditions, Nocedal and Wright 2006, 3.7); or a residual that falls, whatever the energy does.
 enum class LineSearchKind { energy, wolfe, residual };
 
-class IncrementalPotential {
-public:
-  IncrementalPotential(const Scene &scene, DofMap &dofs, const Elements &elements, bool dynamic);
-
+/// How the minimum is looked for.
+struct SolveSettings {
   RetractionKind retraction = RetractionKind::length; ///< of moves that do not name another
   /// Where rounding keeps Newton from its tolerance: what is left counts as nothing below this part of what a step moves.
   double rounding_tolerance = 1e-3;
   LineSearchKind line_search = LineSearchKind::energy;
   int quasi_newton = 1; ///< iterations that share a factorisation
+};
+
+class IncrementalPotential {
+public:
+  SolveSettings settings;
+
+  IncrementalPotential(const Scene &scene, DofMap &dofs, const Elements &elements, bool dynamic);
 
   /// Starts a step; then every rod has to be started before anything else is asked of it: its iterate is the start state with supports'
   /// frames (not yet their positions) moved to the end of the step.
@@ -71,7 +76,7 @@ public:
 
   /// Trial configuration R(iterate, scale x increment) of one rod, with its axial forces; false when impossible.
   bool tryMove(const Planes &increment, double scale, int rod, RetractionKind kind, Configuration &trial);
-  bool tryMove(const Planes &increment, double scale, int rod, Configuration &trial) { return tryMove(increment, scale, rod, retraction, trial); }
+  bool tryMove(const Planes &increment, double scale, int rod, Configuration &trial) { return tryMove(increment, scale, rod, settings.retraction, trial); }
   /// The same for all rods.
   bool tryMove(const Planes &increment, double scale, Configuration &trial);
   /// Makes the trial of one rod, or of all, the iterate.

@@ -1,4 +1,4 @@
-#include "tendril/dynamics/incremental_potential.hpp"
+#include "tendril/solver/incremental_potential.hpp"
 
 #include "tendril/energy/edge.hpp"
 

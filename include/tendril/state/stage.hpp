@@ -2,7 +2,7 @@
 /// \file stage.hpp
 /// How displacements, velocities and accelerations hang together in one stage of a time step: all that an integrator tells the incremental potential.
 
-#include "tendril/dynamics/state.hpp"
+#include "tendril/state/state.hpp"
 
 namespace tendril {
 

@@ -2,7 +2,7 @@
 /// \file accuracy.hpp
 /// The edges, and in dynamics the steps, that a scene needs for its estimated error to be below a tolerance.
 
-#include "tendril/io/estimate.hpp"
+#include "tendril/accuracy/estimate.hpp"
 
 #include <functional>
 

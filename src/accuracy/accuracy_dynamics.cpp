@@ -1,4 +1,4 @@
-#include "tendril/io/samples.hpp"
+#include "tendril/accuracy/samples.hpp"
 #include "tendril/solver/activity.hpp"
 
 #include <algorithm>

@@ -2,7 +2,7 @@
 /// \file samples.hpp
 /// A run in memory, sampled at fixed times: what estimates of errors in dynamics compare.
 
-#include "tendril/io/accuracy.hpp"
+#include "tendril/accuracy/accuracy.hpp"
 
 namespace tendril {
 

@@ -1,4 +1,4 @@
-#include "tendril/io/estimate.hpp"
+#include "tendril/accuracy/estimate.hpp"
 
 #include "tendril/dynamics/prolong.hpp"
 #include "tendril/solver/activity.hpp"
@@ -14,9 +14,6 @@ namespace {
 constexpr double most_difference = 0.3;
 /// Differences below this part of the length tell nothing about branches, whatever the displacement: Newton's tolerance may leave as much.
 constexpr double least_difference = 1e-6;
-
-constexpr std::pair<const char *, double EnergyBudget::*> energies[] = {
-    {"stretch", &EnergyBudget::stretch}, {"bend", &EnergyBudget::bend}, {"twist", &EnergyBudget::twist}, {"gravity", &EnergyBudget::gravity}};
 
 template <class... Parts> std::string text(const Parts &...parts) {
   std::ostringstream s;
@@ -146,7 +143,7 @@ Estimate richardson(const Scene &scene, const Answer &coarse, const Answer &fine
   if (coarse.load_factor != fine.load_factor)
     out.none = text("the two answers end at different load factors, ", exactly(coarse.load_factor), " and ", exactly(fine.load_factor));
   out.energy = coarse.energy;
-  for (const auto &[name, member] : energies) out.energy_error.*member = (coarse.energy.*member - fine.energy.*member) * 4 / 3;
+  for (const auto &[name, member] : estimated_energies) out.energy_error.*member = (coarse.energy.*member - fine.energy.*member) * 4 / 3;
   return out;
 }
 
@@ -157,7 +154,7 @@ std::vector<std::string> describe(const Estimate &e, const Scene &scene) {
     lines.push_back(text("estimated error: position ", worst.error, " m, ", worst.error / worst.length, " of the length of rod '",
                          scene.rods[e.worstRod()].name, "' (vertex ", worst.vertex, ")"));
     std::string line;
-    for (const auto &[name, member] : energies)
+    for (const auto &[name, member] : estimated_energies)
       if (e.energy.*member != 0)
         line += (line.empty() ? "" : ", ") + text(name, " energy ", std::abs(e.energy_error.*member), " of ") + exactly(e.energy.*member) + " J";
     if (!line.empty()) lines.push_back("estimated error: " + line);
@@ -170,37 +167,6 @@ std::vector<std::string> describe(const Estimate &e, const Scene &scene) {
     lines.push_back(text("estimated error: critical load factor ", e.critical_error[k], ", extrapolated ") + exactly(e.critical[k]));
   if (!e.no_critical.empty()) lines.push_back("no estimate of critical load factors: " + e.no_critical);
   return lines;
-}
-
-void writeEstimate(const std::string &path, const Estimate &e) {
-  Hdf5File file = Hdf5File::reopen(path);
-  file.createGroup("estimate");
-  file.writeAttribute("estimate", "valid", int(e.none.empty()));
-  if (!e.critical.empty()) {
-    file.write("estimate/critical_load_factor", {e.critical.size()}, e.critical.data(), "1");
-    file.write("estimate/critical_error", {e.critical.size()}, e.critical_error.data(), "1");
-  }
-  if (!e.none.empty()) return file.writeAttribute("estimate", "reason", e.none);
-  const hsize_t n = e.position.size();
-  file.write("estimate/position", {n, 3}, e.position[0].data(), "m");
-  file.write("estimate/error", {n}, e.error.data(), "m");
-  const RodEstimate &worst = e.rods[e.worstRod()];
-  file.writeAttribute("estimate", "position_error", worst.error);
-  file.writeAttribute("estimate", "relative_position_error", worst.error / worst.length);
-  for (const auto &[name, member] : energies) file.writeAttribute("estimate", std::string(name) + "_energy_error", std::abs(e.energy_error.*member));
-}
-
-std::optional<double> accumulatedTimeError(const Diagnostics &row) {
-  const auto &names = Diagnostics::names();
-  const auto found = std::find(names.begin(), names.end(), "error_estimate");
-  if (found == names.end()) return std::nullopt;
-  return row.values()[std::size_t(found - names.begin())];
-}
-
-void writeTimeError(const std::string &path, double error) {
-  Hdf5File file = Hdf5File::reopen(path);
-  file.createGroup("estimate");
-  file.writeAttribute("estimate", "time_error", error);
 }
 
 } // namespace tendril

@@ -1,4 +1,4 @@
-#include "tendril/io/samples.hpp"
+#include "tendril/accuracy/samples.hpp"
 
 #include <algorithm>
 #include <numeric>

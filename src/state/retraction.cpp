@@ -1,6 +1,4 @@
-#include "tendril/solver/retraction.hpp"
-
-#include "tendril/energy/edge.hpp"
+#include "tendril/state/retraction.hpp"
 
 namespace tendril {
 namespace {

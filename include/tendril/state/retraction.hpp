@@ -2,7 +2,7 @@
 /// \file retraction.hpp
 /// Moving along the configuration manifold: from a configuration, by increments of the unknowns, to another configuration.
 
-#include "tendril/dynamics/state.hpp"
+#include "tendril/state/state.hpp"
 
 namespace tendril {
 

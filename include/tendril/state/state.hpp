@@ -2,7 +2,7 @@
 /// \file state.hpp
 /// What a run must remember between steps, and what is derived from it.
 
-#include "tendril/model/elements.hpp"
+#include "tendril/layout/elements.hpp"
 
 #include <cstdint>
 
@@ -108,10 +108,6 @@ Configuration configurationOf(const State &state, const Scene &scene, const Elem
 void setSupports(const Scene &scene, const Elements &elements, double motion_time, Configuration &c);
 void setRod(const State &state, const Elements &elements, int rod, Configuration &c);
 
-/// Strains of a configuration: a row over slots of the edges' axial ones, and three of the cells', each with room for a pack behind.
-std::vector<double> strainsOf(const Elements &elements, const Configuration &c);
-inline std::size_t strainRow(const Elements &elements) { return std::size_t(elements.slots) + lanes; }
-
 /// Present frame of a support.
 Frame supportFrame(const Support &support, double motion_time);
 
@@ -144,16 +140,6 @@ inline Pack spinOver(const Configuration &start, const Configuration &now, int s
   const Pack principal = halfAngleBetween(start.frames<Pack>(slot), now.frames<Pack>(slot)).angle();
   const Pack turns = Pack(2 * pi) * floor((read<Pack>(now[Configuration::spin] + slot) - principal) * Pack(0.5 / pi) + Pack(0.5));
   return principal + turns;
-}
-
-/// Constants of a cell with its whole turns.
-template <class T> CellOf<T> cellOf(const Planes &cells, const Configuration &c, int slot) {
-  using std::floor;
-  CellOf<T> cell = readCell<T>(cells, slot);
-  cell.turns = read<T>(c[Configuration::turns] + slot);
-  const T half = floor(cell.turns * T(0.5 / pi) + T(0.5)) * T(0.5);
-  cell.sign = T(1.0) - T(4.0) * (half - floor(half)); // -1 when their number is odd
-  return cell;
 }
 
 } // namespace tendril

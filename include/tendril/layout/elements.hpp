@@ -72,21 +72,4 @@ int edgeAt(const RodRange &rod, int slot);
 /// Planes of Elements::cells().
 enum CellPlane : int { cell_stiffness = 0, cell_rest = 3, cell_weight = 6, cell_free = 8, cell_base = 10, cell_planes = 11 };
 
-/// Constants of the cell (or pack of cells) at a slot, without turns.
-template <class T> CellOf<T> readCell(const Planes &cells, int slot) {
-  CellOf<T> c;
-  for (int k = 0; k < 3; ++k) {
-    c.stiffness[k] = read<T>(cells[cell_stiffness + k] + slot);
-    c.rest[k] = read<T>(cells[cell_rest + k] + slot);
-  }
-  for (int k = 0; k < 2; ++k) {
-    c.weight[k] = read<T>(cells[cell_weight + k] + slot);
-    c.free[k] = read<T>(cells[cell_free + k] + slot);
-  }
-  c.base = read<T>(cells[cell_base] + slot);
-  c.turns = T(0.0);
-  c.sign = T(1.0);
-  return c;
-}
-
 } // namespace tendril

@@ -1,0 +1,48 @@
+#pragma once
+/// \file cell.hpp
+/// Cells of a rod as the kernels of bend_twist.hpp want them: constants, whole turns and strains, one at a time or a pack.
+
+#include "tendril/energy/bend_twist.hpp"
+#include "tendril/state/state.hpp"
+
+namespace tendril {
+
+/// Constants of the cell (or pack of cells) at a slot, without turns.
+template <class T> CellOf<T> readCell(const Planes &cells, int slot) {
+  CellOf<T> c;
+  for (int k = 0; k < 3; ++k) {
+    c.stiffness[k] = read<T>(cells[cell_stiffness + k] + slot);
+    c.rest[k] = read<T>(cells[cell_rest + k] + slot);
+  }
+  for (int k = 0; k < 2; ++k) {
+    c.weight[k] = read<T>(cells[cell_weight + k] + slot);
+    c.free[k] = read<T>(cells[cell_free + k] + slot);
+  }
+  c.base = read<T>(cells[cell_base] + slot);
+  c.turns = T(0.0);
+  c.sign = T(1.0);
+  return c;
+}
+
+/// Constants of a cell with its whole turns.
+template <class T> CellOf<T> cellOf(const Planes &cells, const Configuration &c, int slot) {
+  using std::floor;
+  CellOf<T> cell = readCell<T>(cells, slot);
+  cell.turns = read<T>(c[Configuration::turns] + slot);
+  const T half = floor(cell.turns * T(0.5 / pi) + T(0.5)) * T(0.5);
+  cell.sign = T(1.0) - T(4.0) * (half - floor(half)); // -1 when their number is odd
+  return cell;
+}
+
+/// Present strains of a cell (or a pack of `count` cells), integrated over it [rad].
+template <class T> std::array<T, 3> presentStrain(const Elements &elements, const Configuration &configuration, int rod, const LooseCell &cell, int count = 1) {
+  const auto [f0, f1] = cellFrames<T>(configuration, cell, count);
+  const CellOf<T> constants = cellOf<T>(elements.cells(), configuration, cell.slot);
+  return elements.measure[rod] == Measure::tan ? cellStrain<Measure::tan>(f0, f1, constants) : cellStrain<Measure::angle>(f0, f1, constants);
+}
+
+/// Strains of a configuration: a row over slots of the edges' axial ones, and three of the cells', each with room for a pack behind.
+std::vector<double> strainsOf(const Elements &elements, const Configuration &c);
+inline std::size_t strainRow(const Elements &elements) { return std::size_t(elements.slots) + lanes; }
+
+} // namespace tendril
