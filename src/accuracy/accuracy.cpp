@@ -10,12 +10,6 @@
 
 namespace tendril {
 
-std::string shortText(double value) {
-  std::ostringstream s;
-  s << std::setprecision(3) << value;
-  return s.str();
-}
-
 int roundedUp(double edges, int multiple) { return multiple * std::max(1, int(std::ceil(edges / multiple * (1 - 1e-12)))); }
 
 std::string nameOf(Quantity q) { return q == Quantity::tip ? "tip" : q == Quantity::energy ? "energy" : "position"; }

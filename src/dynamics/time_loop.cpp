@@ -290,9 +290,10 @@ bool TimeLoop::adapt(double h, double dt_min, const StepError &error) {
 PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finished) {
   PetscFunctionBeginUser;
   IncrementalPotential &potential = solver_.potential();
-  const double dt_min = settings_.dt_min > 0 ? settings_.dt_min : settings_.dt / 1024;
+  const double longest = settings_.dt_max > 0 ? std::min(settings_.dt, settings_.dt_max) : settings_.dt;
+  const double dt_min = settings_.dt_min > 0 ? settings_.dt_min : longest / 1024;
   const bool adapts = settings_.dynamic && settings_.adapt == Adaptation::error;
-  if (control.dt == 0) control.dt = adapts && settings_.dt_max > 0 ? std::min(settings_.dt, settings_.dt_max) : settings_.dt;
+  if (control.dt == 0) control.dt = longest;
   double &dt = control.dt;
   int &good = control.good;
   bool &stable = control.stable;
@@ -383,7 +384,9 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
       in_vain += report.iterations;
       good = 0;
       dt = 0.5 * h;
-      if (!report.lost && dt >= std::min(dt_min, (settings_.t_end - state.time) / 1024)) continue; // a short last step may be halved as often
+      // A short last step may be halved as often, unless it was said how short steps may be.
+      const double shortest = settings_.dt_min > 0 ? dt_min : std::min(dt_min, (settings_.t_end - state.time) / 1024);
+      if (!report.lost && dt >= shortest * (1 - 1e-9)) continue;
       std::ostringstream message;
       message << (settings_.dynamic ? "step at time " : "load step at factor ") << state.time << " failed with " << (settings_.dynamic ? "dt " : "increment ")
               << h << ": " << report.reason << " (" << report.iterations << (report.iterations == 1 ? " iteration)" : " iterations)");

@@ -1,6 +1,7 @@
 #include "tendril/io/checkpoint.hpp"
 
 #include "tendril/energy/edge.hpp"
+#include "tendril/io/text.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -72,13 +73,6 @@ std::string textOf(const Support &support) {
   std::string table;
   for (const Motion::Key &k : m.table) table += textOf(k.time) + textOf(k.displacement) + textOf(k.rotation);
   return text + ", motion by a table of " + std::to_string(m.table.size()) + " rows, #" + hashOf(table);
-}
-
-/// Facts are lines of a text.
-std::string inOneLine(std::string text) {
-  for (char &c : text)
-    if (static_cast<unsigned char>(c) < ' ') c = '?';
-  return text;
 }
 
 class Writer {
@@ -260,7 +254,8 @@ template <class Archive, class AnyContents> void exchange(Archive &a, AnyContent
 }
 
 using Kind = RunFacts::Kind;
-constexpr const char *kinds[] = {"option", "load", "scene"};
+constexpr const char *kinds[] = {"option", "load", "scene", "start"};
+constexpr const char *order_of_rods = "order of the rods", *names_of_rods = "names of the rods";
 
 std::string joined(const std::vector<RunFacts::Fact> &facts) {
   std::string text;
@@ -294,6 +289,12 @@ int compare(const Values &before, const Values &now, bool options, std::vector<s
     const bool gone = present == now.end(), added = old == before.end();
     if (!gone && !added && old->second == present->second) continue;
     if (key.first == kinds[int(Kind::option)] && (!options || gone || added)) continue; // an option of another method
+    if (key.first == kinds[int(Kind::start)]) {
+      lines.push_back("changed since the checkpoint, but only for the start, so that it is ignored: " + key.second + ": " + (added ? "none" : old->second) +
+                      " -> " + (gone ? "none" : present->second));
+      continue;
+    }
+    if (added && (key.second == order_of_rods || key.second == names_of_rods)) continue; // earlier versions did not keep it
     for (int k = 0; k < 3; ++k)
       if (key.first == kinds[k]) kind = std::max(kind, k);
     const bool is_long = any.find('#') != std::string::npos;
@@ -448,8 +449,14 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
   add(Kind::scene, "gravity", textOf(scene.gravity));
   if (!scene.rotation.angular_velocity.isZero(0))
     add(Kind::scene, "rotation", textOf(scene.rotation.angular_velocity) + " about " + textOf(scene.rotation.centre));
-  Digest topology;
+  Digest topology, order, set;
+  std::vector<std::string> names;
   for (const Rod &rod : scene.rods) {
+    names.push_back(rod.name);
+    order.add(rod.name + "\n");
+    std::string start = rod.initial_velocity.isZero(0) ? "" : "velocity " + textOf(rod.initial_velocity);
+    if (rod.initial_turns != 0) start += (start.empty() ? "turns " : ", turns ") + textOf(rod.initial_turns);
+    if (!start.empty()) add(Kind::start, "start of rod '" + rod.name + "'", start);
     const int sizes[] = {rod.vertices(), rod.edges(), int(rod.closed)};
     topology.add(sizes, sizeof sizes);
     const std::string of = " of rod '" + rod.name + "'";
@@ -464,6 +471,10 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
     add(Kind::scene, "shape at rest" + of, "#" + shape.hex());
   }
   topology_hash = topology.hex();
+  std::sort(names.begin(), names.end());
+  for (const std::string &name : names) set.add(name + "\n");
+  add(Kind::scene, order_of_rods, "#" + order.hex());
+  add(Kind::scene, names_of_rods, "#" + set.hex());
   auto at = [&](const char *what, int place, int rod) { return std::string(what) + std::to_string(place) + " of rod '" + scene.rods[rod].name + "'"; };
   for (const Support &s : scene.supports) add(Kind::scene, at("support at vertex ", s.vertex, s.rod), textOf(s));
   for (const NodalForce &f : scene.forces) add(Kind::load, at("force on vertex ", f.vertex, f.rod), textOf(f.force));
@@ -539,6 +550,9 @@ bool readCheckpoint(const std::string &path, Simulation *run, StepControl *contr
       if (!in.finish()) lines.push_back(path + ": has no checksum: its data are taken as they are");
       switches = mode != (facts.dynamic ? "dynamic" : "static");
       const Values old = valuesOf(text), now = valuesOf(joined(facts.facts));
+      const std::pair<std::string, std::string> order{kinds[int(Kind::scene)], order_of_rods}, names{kinds[int(Kind::scene)], names_of_rods};
+      if (old.count(order) && old.at(order) != now.at(order) && old.at(names) == now.at(names))
+        throw OtherRun(path + ": has the same rods in another order; write them in the scene in the order of the checkpoint");
       const std::pair<std::string, std::string> adapt{kinds[int(Kind::option)], "dt_adapt"};
       same_dt = dt == facts.dt && old.count(adapt) == now.count(adapt) && (!now.count(adapt) || old.at(adapt) == now.at(adapt));
       same_method = integrator == facts.integrator && c.strain_row == strainRow(elements);

@@ -105,8 +105,9 @@ MaterialRead readMaterial(YamlMap &rod, const Overrides &overrides) {
   m.stiffness_damping_coefficient = in.number("rods[].material.stiffness_damping_coefficient");
   map.finish();
   // Sections of 1e-100 or 1e100 m leave the range of numbers.
-  for (const double v : {m.linear_density, m.axial_stiffness, 1 + m.linear_rotational_inertia, 1 + m.torsional_stiffness, 1 + m.flexural_stiffness[0],
-                         1 + m.flexural_stiffness[1]})
+  const double bending = section && !in.has(*flexural) ? 0 : 1; // where stiffnesses are given, they may be zero
+  for (const double v : {m.linear_density, m.axial_stiffness, 1 + m.linear_rotational_inertia, 1 + m.torsional_stiffness, bending + m.flexural_stiffness[0],
+                         bending + m.flexural_stiffness[1]})
     if (!(v > 0 && std::isfinite(v))) in.block().fail("the material's stiffness or density comes out as zero or infinite; check its numbers (SI units)");
   if (twists && m.torsional_stiffness == 0 && m.linear_rotational_inertia == 0)
     in.block().fail("'torsional_stiffness' and 'linear_rotational_inertia' are both zero: nothing resists turning about the axis; give one of them");

@@ -111,6 +111,7 @@ private:
       } catch (const std::exception &) {}
       if (used == 0 || used != word.size()) fail(key, "'" + word + "' is not a number");
       if (!std::isfinite(value)) fail(key, "must be finite, found '" + word + "'");
+      if (!isOfAnySize(value)) fail(key, "must be 0 or of a size between 1e-100 and 1e100, found '" + word + "'");
       values.push_back(value);
     }
     return values;
@@ -146,6 +147,33 @@ std::set<std::string> readFields(const Texts &texts) {
 
 /// Prefixes of PETSc's options that are asked for only when the program ends.
 constexpr const char *late_options[] = {"log_", "options_", "malloc", "help", "on_error"};
+
+/// Options of PETSc with which its solvers run, but not to an answer of ours.
+PetscErrorCode refuseUnsuited() {
+  struct Unsuited {
+    const char *option, *fits, *reason; ///< the one value that fits; empty: none does
+  };
+  constexpr Unsuited unsuited[] = {
+      {"snes_type", "newtonls", "is always newtonls: what counts as an answer, ways out of saddles and steps on the manifold of frames are its own"},
+      {"snes_mf", "", "is not for rods: the Hessian is exact, and cheaper than a difference of residuals"},
+      {"snes_mf_operator", "", "is not for rods: the Hessian is exact, and cheaper than a difference of residuals"},
+      {"snes_fd", "", "is not for rods: the Hessian is exact; tests compare it with automatic differentiation"},
+      {"snes_fd_color", "", "is not for rods: the Hessian is exact; tests compare it with automatic differentiation"},
+  };
+  PetscFunctionBeginUser;
+  for (const Unsuited &u : unsuited) {
+    char value[PETSC_MAX_PATH_LEN];
+    PetscBool given;
+    PetscCall(PetscOptionsGetString(nullptr, nullptr, (std::string("-") + u.option).c_str(), value, sizeof value, &given));
+    const std::string word = value;
+    if (given && word != "false" && word != "0" && (word.empty() || word != u.fits)) fail(u.option, u.reason);
+  }
+  char search[PETSC_MAX_PATH_LEN];
+  PetscBool given;
+  PetscCall(PetscOptionsGetString(nullptr, nullptr, "-snes_linesearch_type", search, sizeof search, &given));
+  if (given && std::string(search) == "shell") fail("snes_linesearch_type", "shell needs a program's own function; use retraction, basic, bt, l2 or cp");
+  PetscFunctionReturn(0);
+}
 
 bool isOptionName(const char *word) { return word[0] == '-' && (std::isalpha(static_cast<unsigned char>(word[1])) || word[1] == '-'); }
 
@@ -213,6 +241,7 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
       const bool bare = key->type == KeyType::pair && text.find(',') != std::string::npos && text[0] != '['; // as vectors are written
       o->overrides[name] = bare ? "[" + text + "]" : text;
     }
+  PetscCall(refuseUnsuited());
   texts.number("-snes_rtol"); // PETSc reads them, with less to say about mistakes
   texts.integer("-snes_max_it");
   PetscFunctionReturn(0);
@@ -256,7 +285,8 @@ void resolve(const RunSettings &scene, Options &o) {
   if (o.restart_time && o.restart.empty()) fail("restart_time", "needs -restart");
   if (o.restart_time && !o.loop.dynamic) fail("restart_time", "has no meaning in -mode static, where time is the load factor");
   checkAccuracy(o);
-  if (o.loop.dt_min > o.loop.dt) fail("dt_min", "must not be larger than the step " + std::to_string(o.loop.dt));
+  if (o.loop.dt_min > o.loop.dt) fail("dt_min", "must not be larger than the step " + shortText(o.loop.dt));
+  if (o.loop.dt_max > 0 && o.loop.dt_min > o.loop.dt_max) fail("dt_min", "must not be larger than -dt_max " + shortText(o.loop.dt_max));
 }
 
 std::vector<int> edgesAsked(const Scene &scene, const Options &o) {

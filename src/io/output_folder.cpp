@@ -93,6 +93,16 @@ std::vector<std::string> OutputFolder::checkpoints() const {
   return found;
 }
 
+bool OutputFolder::replaces(const std::string &file) const {
+  std::error_code error;
+  auto isHere = [&](const std::string &folder) {
+    return std::any_of(std::begin(results), std::end(results), [&](const char *name) { return fs::equivalent(file, folder + "/" + name, error); });
+  };
+  if (isHere(path_)) return true;
+  const std::vector<int> numbers = parts();
+  return std::any_of(numbers.begin(), numbers.end(), [&](int n) { return isHere(path_ + "/part_" + std::to_string(n)); });
+}
+
 std::vector<std::string> OutputFolder::clear() const {
   std::vector<std::string> removed = removeResults(path_);
   for (const int n : parts()) {

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
-#include <fstream>
 #include <sstream>
 
 namespace tendril {
@@ -172,6 +171,14 @@ std::vector<Polyline> readHdf5(const std::string &path) {
   return lines;
 }
 
+std::string textOf(const std::string &path, const std::string &missing) {
+  constexpr std::size_t most = 2'000'000'000;
+  std::string text = readBytes(path, missing, most);
+  if (const std::size_t at = text.find('\0'); at != std::string::npos)
+    fail(path, 1 + int(std::count(text.begin(), text.begin() + std::ptrdiff_t(at), '\n')), "the byte 0x00 is no text; save the file as UTF-8");
+  return text;
+}
+
 std::string extensionOf(const std::string &path) {
   std::string extension = std::filesystem::path(path).extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(), ::tolower);
@@ -184,9 +191,9 @@ bool isTextPolyline(const std::string &path) { return extensionOf(path) != ".h5"
 
 std::vector<Polyline> readPolylines(const std::string &path) {
   const std::string extension = extensionOf(path);
-  std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path)) throw SceneError(path + ": cannot be opened; check the path (it is relative to the scene file)");
-  skipByteOrderMark(file);
+  const std::string missing = ": cannot be opened; check the path (it is relative to the scene file)";
+  if (std::filesystem::is_directory(path)) throw SceneError(path + missing);
+  std::istringstream file(isTextPolyline(path) ? textOf(path, missing) : "");
   std::vector<Polyline> lines;
   if (extension == ".csv" || extension == ".txt")
     lines = readPoints(file, path);

@@ -103,6 +103,23 @@ private:
   }
 };
 
+/// What PETSc finds wrong with the command line; empty when it has started. An error handler would be memory of ours, which -malloc_debug takes for corrupted.
+std::string initializePetsc(int *argc, char ***argv) {
+  auto *const print = std::exchange(PetscErrorPrintf, &PetscErrorPrintfNone);
+  const PetscErrorCode error = PetscInitialize(argc, argv, nullptr, nullptr);
+  PetscErrorPrintf = print;
+  if (!error) return {};
+  char *specific = nullptr;
+  (void)PetscErrorMessage(error, nullptr, &specific);
+  return specific && *specific ? specific : "PETSc cannot start";
+}
+
+/// All of a text. \throws WriteError
+void print(const std::string &text) {
+  std::fputs(text.c_str(), stdout);
+  if (std::fflush(stdout) != 0 || std::ferror(stdout)) throw WriteError("standard output cannot be written; is the disk full?");
+}
+
 /// A rod that nothing holds has no equilibrium to find.
 void requireHeld(const Scene &scene) {
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
@@ -232,6 +249,9 @@ bool takeUp(const Options &o, const OutputFolder &folder, const RunFacts &facts,
         told->push_back("passed over: " + std::string(e.what()));
       }
     }
+    if (from.empty() && !told->empty())
+      throw SceneError("option -restart: no checkpoint in '" + o.output_dir + "' is whole (" + told->front() +
+                       "); to run from the start, without those results, take '-restart auto' away");
     if (from.empty()) told->push_back("-restart auto: no checkpoint in " + o.output_dir + ", from the start");
   } else if (!o.restart.empty()) {
     from = std::filesystem::is_directory(o.restart) ? (std::filesystem::path(o.restart) / "checkpoint.h5").string() : o.restart;
@@ -291,7 +311,7 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
     if (readOptions(argc, argv, &o)) throw SceneError("command line: " + errors.message());
   }
   if (o.schema || o.keys) {
-    std::fputs((o.schema ? schemaAsJson() : keysAsJson()).c_str(), stdout);
+    print(o.schema ? schemaAsJson() : keysAsJson());
     PetscFunctionReturn(0);
   }
   if (o.scene.empty()) throw SceneError("option -scene: is required: tendril -scene data/scenes/helix.yaml (-help lists all options)");
@@ -308,6 +328,11 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   if (o.help) PetscFunctionReturn(0);
   PetscCall(refuseUnknownOptions());
   const OutputFolder folder(o.output_dir);
+  std::vector<std::string> inputs = files.files();
+  inputs.insert(inputs.end(), prepared.source.paths.begin(), prepared.source.paths.end());
+  for (const std::string &input : inputs)
+    if (folder.replaces(input))
+      throw SceneError("option -output_dir: results would replace '" + input + "', which this run reads; choose another folder, or another name for that file");
   Choice choice;
   if (o.accuracy) PetscCall(meetAccuracy(prepared, o, &choice));
   const StopRequest request(begin, o.time_limit); // before this, nothing is written: a signal ends the run at once
@@ -500,14 +525,15 @@ int runMain(int count, char **arguments) {
   std::signal(SIGXFSZ, SIG_IGN); // a file that grows beyond its limit cannot be written: that is told
   // Ours before PETSc's, which come only where solvers are set up for a scene.
   auto given = [&](const char *option) { return std::any_of(argv + 1, argv + argc, [&](const char *word) { return std::string_view(word) == option; }); };
-  if (given("--version")) {
-    std::puts(versionText().c_str());
-    return 0;
-  }
-  if (given("-help") || given("-h") || given("--help")) {
-    std::fputs(helpText().c_str(), stdout);
-    std::fflush(stdout);
-    if (!given("-scene") && !given("-options_file")) return 0;
+  try {
+    if (given("--version")) return print(versionText() + "\n"), 0;
+    if (given("-help") || given("-h") || given("--help")) {
+      print(helpText());
+      if (!given("-scene") && !given("-options_file")) return 0;
+    }
+  } catch (const WriteError &e) {
+    std::fprintf(stderr, "tendril: %s\n", e.what());
+    return 3;
   }
   OptionFiles files;
   try {
@@ -516,12 +542,9 @@ int runMain(int count, char **arguments) {
     std::fprintf(stderr, "tendril: %s\n", printable(e.what()).c_str());
     return 1;
   }
-  {
-    const QuietErrors errors;
-    if (PetscInitialize(&argc, &argv, nullptr, nullptr)) {
-      std::fprintf(stderr, "tendril: %s\n", printable(files.locate("command line: " + errors.message())).c_str());
-      return 1;
-    }
+  if (const std::string mistake = initializePetsc(&argc, &argv); !mistake.empty()) {
+    std::fprintf(stderr, "tendril: %s\n", printable(files.locate("command line: " + mistake)).c_str());
+    return 1;
   }
   signals.restore();
   int exit_code = 0;

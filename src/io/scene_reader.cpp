@@ -22,7 +22,7 @@ Vec3 unit(const YamlValue &value) {
 }
 
 /// Shapes a rod block may give; exactly one must be there.
-std::vector<Polyline> readShape(YamlMap &rod) {
+std::vector<Polyline> readShape(YamlMap &rod, double *least_edges) {
   std::vector<Polyline> shapes;
   int given = 0;
   if (rod.has("rods[].line") && ++given) {
@@ -48,6 +48,10 @@ std::vector<Polyline> readShape(YamlMap &rod) {
     h.turns = m.number("rods[].helix.turns");
     h.taper = m.number("rods[].helix.taper");
     h.edges = m.integer("rods[].helix.edges");
+    *least_edges = h.leastEdges();
+    if (h.edges < h.leastEdges())
+      m.at("rods[].helix.edges").fail("a helix of " + shortText(h.turns) + " turns needs at least " + shortText(h.leastEdges()) + " edges, found " +
+                                      std::to_string(h.edges));
     shapes = {helixShape(h)};
     m.finish();
   }
@@ -59,6 +63,7 @@ std::vector<Polyline> readShape(YamlMap &rod) {
   if (rod.has("rods[].file") && ++given) {
     const YamlValue v = rod.at("rods[].file");
     const std::filesystem::path path(v.text());
+    if (path.string() != inOneLine(path.string())) v.fail("'file' must be in one line, found '" + inOneLine(path.string()) + "'");
     try {
       shapes = readPolylines(path.is_absolute() ? path.string() : (std::filesystem::path(v.file()).parent_path() / path).string());
     } catch (const SceneError &e) {
@@ -126,13 +131,19 @@ void readNatural(YamlMap &map, Rod &rod) {
 
 /// Name of a rod, by which supports and loads may find it without doubt.
 std::string readName(YamlMap &map, const std::vector<Rod> &rods) {
-  if (!map.has("rods[].name")) return "rod" + std::to_string(rods.size());
+  auto isTaken = [&](const std::string &name) { return std::any_of(rods.begin(), rods.end(), [&](const Rod &rod) { return isNamed(rod, name); }); };
+  if (!map.has("rods[].name")) {
+    const std::string name = "rod" + std::to_string(rods.size());
+    if (isTaken(name)) map.value().fail("a rod without a name is '" + name + "', and there is one already; give this rod a 'name'");
+    return name;
+  }
   const YamlValue v = map.at("rods[].name");
   const std::string name = v.text();
   if (name.empty() || name == "all" || name.find_first_not_of("0123456789") == std::string::npos)
     v.fail("'name' must not be empty, a number or 'all', found '" + name + "'");
-  for (const Rod &rod : rods)
-    if (isNamed(rod, name)) v.fail("there is a rod '" + name + "' already; choose another 'name'");
+  if (std::any_of(name.begin(), name.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; }))
+    v.fail("'name' must be in one line, found '" + inOneLine(name) + "'");
+  if (isTaken(name)) v.fail("there is a rod '" + name + "' already; choose another 'name'");
   return name;
 }
 
@@ -146,7 +157,8 @@ void readRod(const YamlValue &value, const Overrides &overrides, SceneFile &out,
   std::vector<Rod> &rods = out.scene.rods;
   YamlMap map(value, "rods");
   const std::string name = readName(map, rods);
-  std::vector<Polyline> shapes = readShape(map);
+  double least_edges = 1;
+  std::vector<Polyline> shapes = readShape(map, &least_edges);
   if (map.has("rods[].place")) place(map.at("rods[].place"), shapes);
   Rod common;
   const MaterialRead material = readMaterial(map, overrides);
@@ -197,6 +209,7 @@ void readRod(const YamlValue &value, const Overrides &overrides, SceneFile &out,
       rods.push_back(rod);
       Drawing &drawing = out.drawings.emplace_back();
       drawing.directors_given = map.has("rods[].directors");
+      drawing.least_edges = least_edges;
       if (rod.closed == shapes[k].closed && shapes[k].curve) // a curve that `closed` closes by one more edge is points to us
         drawing.curve = [curve = shapes[k].curve, shift = Vec3(double(copy) * offset)](double s) { return Vec3(curve(s) + shift); };
     }
@@ -284,6 +297,10 @@ void readSupport(const YamlValue &value, SceneFile &out) {
         if (std::abs(v.dot(s.frame.tangent)) > 1e-6) d.fail("'director' is not normal to the tangent of the support");
         s.frame.director = v;
       }
+      for (const int edge : {rod.edgeBefore(s.vertex), rod.edgeAfter(s.vertex)})
+        if (type == "clamp" && edge >= 0 && s.frame.tangent.dot(rod.edge(edge).normalized()) < -0.9999)
+          map.at("supports[].tangent").fail("'tangent' points against edge " + std::to_string(edge) + " of rod '" + rod.name +
+                                            "', which would fold back on itself; tangents point from vertex to vertex, by their numbers");
       if (!s.frame.director.allFinite()) value.fail("'tangent' is parallel to the rod's director; give a 'director' too");
     }
     if (type == "fix_twist" && rod.material.isCable()) value.fail("rod '" + rod.name + "' has no flexural stiffness and no twist to fix");
@@ -355,6 +372,7 @@ void keepFiles(const YamlValue &rods, SceneSource &source) {
     if (!node) continue;
     const std::string path = node.Scalar();
     const std::filesystem::path place = std::filesystem::path(rods.file()).parent_path() / path;
+    source.paths.push_back(place.string());
     const bool seen = std::any_of(source.files.begin(), source.files.end(), [&](const auto &file) { return file.first == path; });
     if (!seen && isTextPolyline(place.string())) source.files.emplace_back(path, contentOf(place, ": cannot be read again"));
   }
@@ -395,6 +413,7 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
   if (map.has("loads"))
     for (const YamlValue &v : map.at("loads").items()) readLoad(v, out);
   map.finish();
+  out.source.paths = {path};
   keepFiles(map.at("rods"), out.source);
   return out;
 }

@@ -3,9 +3,7 @@
 #include "tendril/model/scene.hpp"
 
 #include <algorithm>
-#include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <string_view>
 
 namespace tendril {
@@ -32,22 +30,24 @@ std::string inHex(char c) {
 
 } // namespace
 
-void skipByteOrderMark(std::istream &file) {
-  char first[3] = {};
-  if (file.read(first, 3) && std::string_view(first, 3) == "\xEF\xBB\xBF") return;
-  file.clear();
-  file.seekg(0);
+std::string readBytes(const std::string &path, const std::string &missing, std::size_t most) {
+  constexpr std::string_view mark = "\xEF\xBB\xBF";
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw SceneError(path + missing);
+  std::string text;
+  constexpr std::size_t piece = 1 << 20; // pipes and devices tell no size
+  for (std::size_t size = 0; file && size <= most; size = text.size()) {
+    text.resize(size + piece);
+    file.read(text.data() + size, piece);
+    text.resize(size + std::size_t(file.gcount()));
+  }
+  if (text.size() > most) throw SceneError(path + ": has more than " + std::to_string(most) + " bytes, which are not read; write points into polyline files");
+  return text.starts_with(mark) ? text.substr(mark.size()) : text;
 }
 
 std::string readText(const std::string &path, const std::string &missing) {
-  constexpr std::uintmax_t most = 64'000'000;
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw SceneError(path + missing);
-  std::error_code none;
-  if (const auto size = std::filesystem::file_size(path, none); !none && size > most)
-    throw SceneError(path + ": has " + std::to_string(size) + " bytes, at most " + std::to_string(most) + " are read; write points into polyline files");
-  skipByteOrderMark(file);
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  constexpr std::size_t most = 64'000'000;
+  std::string text = readBytes(path, missing, most);
   for (std::size_t k = 0; k < text.size();) {
     const int length = text[k] == '\r' ? 1 : characterLength(text, k);
     if (length == 0)
@@ -69,6 +69,12 @@ std::string printable(const std::string &text) {
     k += std::size_t(std::max(length, 1));
   }
   return out;
+}
+
+std::string inOneLine(std::string text) {
+  for (char &c : text)
+    if (static_cast<unsigned char>(c) < ' ') c = '?';
+  return text;
 }
 
 std::string excerpt(const std::string &text) {

@@ -125,13 +125,12 @@ double YamlValue::number() const {
   double value;
   if (!node_.IsScalar() || !YAML::convert<double>::decode(node_, value)) fail("'" + name_ + "' must be a number, found " + describe(node_));
   if (!std::isfinite(value)) fail("'" + name_ + "' must be finite, found " + describe(node_));
+  if (!isOfAnySize(value)) fail("'" + name_ + "' must be 0 or of a size between 1e-100 and 1e100, found " + describe(node_));
   return value;
 }
 
 int YamlValue::integer() const {
-  int value;
-  if (node_.IsScalar() && YAML::convert<int>::decode(node_, value)) return value;
-  double number; // as 1e3, or beyond int
+  double number; // not as an int, which would take a leading 0 for a sign of octal numbers
   if (!node_.IsScalar() || !YAML::convert<double>::decode(node_, number) || number != std::floor(number))
     fail("'" + name_ + "' must be a whole number, found " + describe(node_));
   if (!(std::abs(number) <= std::numeric_limits<int>::max())) fail("'" + name_ + "' is too large, found " + describe(node_));
@@ -254,6 +253,8 @@ void YamlMap::finish() const {
     key.fail("unknown key '" + name + "' in '" + value_.name() + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") + " Allowed: " + join(allowed));
   }
 }
+
+bool isOfAnySize(double value) { return value == 0 || (std::abs(value) >= 1e-100 && std::abs(value) <= 1e100); }
 
 std::string outOfBounds(const Key &key, double value) {
   auto text = [](double bound) {

@@ -40,6 +40,8 @@ Vec3 directorBetween(const Rod &written, double place, const Vec3 &tangent) {
 bool isRedrawn(const Rod &written, const Drawing &drawing, int edges) { return drawing.grading || edges != written.edges(); }
 
 Rod redrawn(const Rod &written, const Drawing &drawing, int edges) {
+  if (edges < drawing.least_edges)
+    throw SceneError("rod '" + written.name + "': its turns need at least " + shortText(drawing.least_edges) + " edges, found " + std::to_string(edges));
   Rod rod = written;
   const Grading *grading = drawing.grading.get();
   const Curve curve = drawing.curve ? drawing.curve : grading ? splineThrough(written) : curveThrough(written);

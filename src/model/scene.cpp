@@ -1,6 +1,7 @@
 #include "tendril/model/scene.hpp"
 
 #include <algorithm>
+#include <iomanip>
 #include <sstream>
 
 namespace tendril {
@@ -53,6 +54,12 @@ Vec3 Motion::turnBetween(double from, double to) const {
     before = now;
   }
   return sum;
+}
+
+std::string shortText(double value) {
+  std::ostringstream s;
+  s << std::setprecision(3) << value;
+  return s.str();
 }
 
 bool Scene::stiffnessDissipates() const {
@@ -131,6 +138,21 @@ void checkRod(const Rod &rod) {
     if (c < -0.9999)
       fail("folds back on itself at vertex ", v, " (turning angle ", degrees(std::acos(std::max(-1.0, c))), " degrees); edges may turn by less than 179");
   }
+  if (rod.material.isCable()) return;
+  double length = 0, longest = 0; // of a cell
+  for (int i = 0; i < rod.edges(); ++i) length += rod.edge(i).norm();
+  for (int v = 0; v < rod.vertices(); ++v) {
+    const int a = rod.edgeBefore(v), b = rod.edgeAfter(v);
+    if (a >= 0 && b >= 0) longest = std::max(longest, 0.5 * (rod.edge(a).norm() + rod.edge(b).norm()));
+  }
+  // What one vertex may take: half a turn, of twist only in measure tan.
+  const Vec3 natural = rod.natural == Rod::Natural::given ? rod.natural_strain : Vec3::Zero();
+  const double bend = std::hypot(natural[0], natural[1]) * longest, drawn = 2 * pi * std::abs(rod.initial_turns) / length * longest;
+  if (!(bend < pi)) fail("its natural curvature turns it by ", degrees(bend), " degrees at a vertex; use more edges: less than 180 is possible");
+  if (rod.measure != Measure::tan) return;
+  const double twist = std::abs(natural[2]) * longest;
+  if (!(twist < pi)) fail("its natural twist is ", degrees(twist), " degrees at a vertex; measure tan takes less than 180: use more edges, or measure angle");
+  if (!(drawn < pi)) fail("'turns' twist it by ", degrees(drawn), " degrees at a vertex; measure tan takes less than 180: use more edges, or measure angle");
 }
 
 DimensionlessGroups dimensionlessGroups(const Rod &rod, const Vec3 &gravity) {
@@ -150,7 +172,8 @@ DimensionlessGroups dimensionlessGroups(const Rod &rod, const Vec3 &gravity) {
       g.corner_softness = softness;
       g.softest_corner = v;
     }
-    g.largest_twist = std::max(g.largest_twist, std::abs(degrees(halfAngleBetween(f0, f1).angle())));
+    const double drawn = pi * rod.initial_turns * (f0.length + f1.length) / g.length; // over the cell, by `turns`
+    g.largest_twist = std::max(g.largest_twist, std::abs(degrees(halfAngleBetween(f0, f1).angle() + drawn)));
   }
   return g;
 }

@@ -74,6 +74,19 @@ def commands(folder):
         assert np.array_equal(x, y), first
     done = subprocess.run([program, "nowhere.yaml"], cwd=folder, capture_output=True, text=True)
     assert done.returncode == 1 and "nowhere.yaml: cannot be opened" in done.stderr, done.stderr
+    # A scene through a pipe; memory that PETSc checks; a disk that is full.
+    with open(f"{folder}/scene.yaml", "w") as f:
+        f.write(LINE)
+    for words in (["/dev/stdin"], ["scene.yaml", "-malloc_debug"]):
+        with open(f"{folder}/scene.yaml") as f:
+            done = subprocess.run([program, *words, "-output_dir", "piped"], cwd=folder, stdin=f, capture_output=True, text=True)
+        assert done.returncode == 0 and not done.stderr and "corrupted" not in done.stdout, done
+    for word in ("-schema", "--help", "--version"):
+        with open("/dev/full", "w") as full:
+            assert subprocess.run([program, word], stdout=full, stderr=subprocess.PIPE).returncode == 3, word
+    # Steps are not shorter than asked for.
+    done = subprocess.run([program, "scene.yaml", "-mode", "dynamic", "-dt", "0.01", "-snes_max_it", "1", "-dt_min", "0.005"], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 2 and "failed with dt 0.005" in done.stderr, done
     # A sweep over integrators may have statics in it.
     _, y, _ = run(folder, LINE, "-integrator", "bdf2")
     assert np.array_equal(x, y)

@@ -211,6 +211,13 @@ def folders(tmp):
     first.wait()
     run(0, *base, "-t_end", 0.02, says="removed from")
     assert not os.path.exists(out + "/.lock")
+    # What a run reads is not taken for the result of another.
+    os.makedirs(tmp + "/own")
+    own = tmp + "/own/options.yaml"
+    with open(cantilever) as f:
+        write(own, f.read())
+    run(1, "-scene", own, "-output_dir", tmp + "/own", says=["results would replace", own])
+    assert os.path.exists(own)
     print("folders are held and cleared")
 
 
@@ -247,7 +254,27 @@ def automatic(tmp):
     # Without -restart the run begins anew, and none of its parts is left to go on from.
     run(0, *options[:-2], "-t_end", 0.01, says="part_1")
     assert not glob.glob(out + "/part_*")
+    # Where no checkpoint is whole, nothing is thrown away.
+    with open(last, "r+b") as f:
+        f.truncate(3000)
+    run(1, *options, says=["no checkpoint in", "is whole", "take '-restart auto' away"])
+    assert os.path.exists(out + "/trajectory.h5")
     print("restarted automatically after", kills, "kills")
+
+
+def orders(tmp):
+    """Rods are those of the checkpoint by their order: another one is refused, and what counts at the start only is said to be ignored."""
+    rods = {name: f"  - {{name: {name}, line: {{from: [0, 0, {z}], to: [1, 0, {z}], edges: 8}}, material: {{radius: 0.01, young: 1e7, poisson: 0.3, density: 1000}}}}\n"
+            for z, name in enumerate("ab")}
+    text = "simulation: {dt: 0.01, t_end: 0.1}\nrods:\n%ssupports: [{rod: all, vertex: 0, type: clamp}]\n"
+    write(tmp + "/ab.yaml", text % (rods["a"] + rods["b"]))
+    write(tmp + "/ba.yaml", text % (rods["b"] + rods["a"]))
+    write(tmp + "/fast.yaml", text % (rods["a"].replace("}\n", ", velocity: [0, 5, 0]}\n") + rods["b"]))
+    run(0, "-scene", tmp + "/ab.yaml", "-output_dir", tmp + "/first")
+    again = ["-restart", tmp + "/first", "-t_end", 0.2, "-output_dir", tmp + "/second"]
+    run(1, "-scene", tmp + "/ba.yaml", *again, says="the same rods in another order")
+    run(0, "-scene", tmp + "/fast.yaml", *again, says=["it is ignored: start of rod 'a': none -> velocity [0, 5, 0]"])
+    print("rods in another order are refused")
 
 
 def signals(tmp):
@@ -341,7 +368,7 @@ def full(tmp):
     print("full disks are told,", with_frames, "with frames")
 
 
-for test in (letGo, changes, balances, folders, automatic, signals, full):
+for test in (letGo, changes, balances, folders, automatic, orders, signals, full):
     if len(sys.argv) > 3 and test.__name__ not in sys.argv[3:]:
         continue
     with tempfile.TemporaryDirectory() as folder:

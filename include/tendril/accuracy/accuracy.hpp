@@ -38,8 +38,6 @@ struct Choice {
 constexpr double aim = 0.8;        ///< of the tolerance: an estimate is a few percent off itself
 constexpr double most_edges = 2e4; ///< of a rod: rounding grows with the fourth power of their number
 int roundedUp(double edges, int multiple);
-/// Three digits.
-std::string shortText(double value);
 /// "option -accuracy: an error of the tip below 0.001"
 std::string askedFor(const Accuracy &accuracy);
 /// 8 edges of each rod, or as many as make no vertex turn by more than 30 degrees, as drawn and at rest. \param multiple edgeMultiple of each

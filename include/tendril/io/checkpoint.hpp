@@ -9,7 +9,7 @@ namespace tendril {
 
 /// A run by what a restart compares: what is other is told, and another topology is refused.
 struct RunFacts {
-  enum class Kind { option, load, scene };
+  enum class Kind { option, load, scene, start };
   struct Fact {
     Kind kind;
     std::string name, value; ///< a value that begins with # stands for something long, by its hash

@@ -14,6 +14,8 @@ public:
   /// \param argc, argv of main
   /// \throws SceneError naming file and line
   void read(int argc, char **argv);
+  /// Paths, in the order in which PETSc reads them.
+  const std::vector<std::string> &files() const { return files_; }
   /// "file:line" of an option, without its dash; empty where the command line gives it, or nothing does.
   std::string place(const std::string &option) const;
   /// The message with the place of the option that it begins with. PETSc's name no option: they get those whose value they tell, or the files.

@@ -18,6 +18,8 @@ public:
 
   /// Checkpoints of earlier runs here, the newest first: that of the last one, then those of the parts set aside.
   std::vector<std::string> checkpoints() const;
+  /// Whether a run here would remove or replace a file: it has the name and the place of a result.
+  bool replaces(const std::string &file) const;
   /// Removes results of earlier runs, with all parts; names of what went.
   std::vector<std::string> clear() const;
   /// Makes room for a run that goes on from one of checkpoints(): moves the results that it is of to part_1, part_2 ..., or removes results of

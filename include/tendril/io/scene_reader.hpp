@@ -19,6 +19,7 @@ struct RunSettings {
 struct SceneSource {
   std::string text;
   std::vector<std::pair<std::string, std::string>> files; ///< path as written and content of each text file that it names
+  std::vector<std::string> paths;                         ///< of all files it was read from
 };
 
 struct SceneFile {

@@ -2,7 +2,6 @@
 /// \file text.hpp
 /// Text from files, and text for terminals.
 
-#include <istream>
 #include <string>
 
 namespace tendril {
@@ -12,11 +11,14 @@ namespace tendril {
 /// \throws SceneError: cannot be opened, is larger than 64 MB, or with the line of the first byte that is no text
 std::string readText(const std::string &path, const std::string &missing);
 
-/// Puts a file that begins with a byte order mark of UTF-8 behind it.
-void skipByteOrderMark(std::istream &file);
+/// The bytes of a file, a pipe or a device, without a byte order mark of UTF-8. \throws SceneError: cannot be opened, or has more than `most`
+std::string readBytes(const std::string &path, const std::string &missing, std::size_t most);
 
 /// What may go to a terminal: control characters but newline and tab, and bytes that are no UTF-8, as \xNN.
 std::string printable(const std::string &text);
+
+/// Control characters, newlines too, as question marks.
+std::string inOneLine(std::string text);
 
 /// In quotes, with at most 60 bytes.
 std::string excerpt(const std::string &text);

@@ -17,6 +17,8 @@ struct HelixShape {
   Vec3 origin, axis, start;
   double length, radius, turns, taper; ///< length along the axis [m]
   int edges;
+  /// With fewer edges, vertices would stand on another curve of fewer turns.
+  double leastEdges() const { return std::floor(2 * std::abs(turns)) + 1; }
 };
 Polyline helixShape(const HelixShape &helix);
 

@@ -14,6 +14,7 @@ struct Drawing {
   Curve curve;                                      ///< of `line`, `ring` and `helix`; empty: the curve through its points
   bool directors_given = false;                     ///< one for each edge; otherwise they are Bishop frames
   std::shared_ptr<const Grading> grading = nullptr; ///< of its vertices along the curve; empty: uniform in the parameter
+  double least_edges = 1;                           ///< with fewer, it would be another curve
 };
 
 /// A curve through the vertices of a rod, where the vertices are those of i/edges: on each edge the cubic through four neighbouring points over the

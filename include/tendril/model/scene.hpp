@@ -15,6 +15,8 @@ namespace tendril {
 struct SceneError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
+/// A number with three digits, for messages.
+std::string shortText(double value);
 
 /// Rod as drawn: the reference configuration. Vertex i and i+1 bound edge i; a closed rod has as many edges as vertices.
 struct Rod {
