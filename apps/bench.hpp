@@ -1,6 +1,7 @@
 #pragma once
 /// \file bench.hpp
-/// What the benchmarks and the test of the speed share: a scene of any size, and LAPACK's band solver as the yardstick of a machine.
+/// What the benchmarks and the test of the speed share: a scene of any size, and LAPACK's band solver as the yardstick
+/// of a machine.
 
 #include "tendril/dynamics/simulation.hpp"
 #include "tendril/model/builders.hpp"
@@ -12,9 +13,10 @@
 
 // PETSc links LAPACK but does not declare these.
 extern "C" {
-void dpbtrf_(const char *uplo, const PetscBLASInt *n, const PetscBLASInt *kd, double *ab, const PetscBLASInt *ldab, PetscBLASInt *info);
-void dpbtrs_(const char *uplo, const PetscBLASInt *n, const PetscBLASInt *kd, const PetscBLASInt *nrhs, const double *ab, const PetscBLASInt *ldab, double *b,
-             const PetscBLASInt *ldb, PetscBLASInt *info);
+void dpbtrf_(const char *uplo, const PetscBLASInt *n, const PetscBLASInt *kd, double *ab, const PetscBLASInt *ldab,
+             PetscBLASInt *info);
+void dpbtrs_(const char *uplo, const PetscBLASInt *n, const PetscBLASInt *kd, const PetscBLASInt *nrhs,
+             const double *ab, const PetscBLASInt *ldab, double *b, const PetscBLASInt *ldb, PetscBLASInt *info);
 }
 
 namespace tendril::bench {
@@ -27,8 +29,8 @@ private:
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
-/// Straight cantilevers side by side, of the rubber of data/scenes/cantilever.yaml. Their edges are 1 cm long whatever their number, so that an edge
-/// is as stiff in a long rod as in a short one.
+/// Straight cantilevers side by side, of the rubber of data/scenes/cantilever.yaml. Their edges are 1 cm long whatever
+/// their number, so that an edge is as stiff in a long rod as in a short one.
 inline Scene cantilevers(int rods, int edges) {
   constexpr double edge_length = 0.01, spacing = 0.05, young = 1e7, poisson = 0.5; // [m], [m], [Pa]
   Scene scene;
@@ -36,7 +38,8 @@ inline Scene cantilevers(int rods, int edges) {
     Rod rod;
     rod.name = "rod" + std::to_string(r);
     rod.position = lineShape(Vec3(0, 0, r * spacing), Vec3(edges * edge_length, 0, r * spacing), edges).points;
-    rod.material = homogeneousMaterial({SectionShape::circle, {0.005, 0.005}}, young, young / (2 * (1 + poisson)), 1200);
+    rod.material =
+        homogeneousMaterial({SectionShape::circle, {0.005, 0.005}}, young, young / (2 * (1 + poisson)), 1200);
     setBishopDirectors(rod);
     scene.supports.push_back({Support::Kind::clamp, r, 0, {}, frameAtVertex(rod, 0)});
     scene.rods.push_back(std::move(rod));
@@ -44,14 +47,16 @@ inline Scene cantilevers(int rods, int edges) {
   return scene;
 }
 
-/// A symmetric positive definite band as wide as that of a rod's Hessian (4 unknowns per edge, each coupled to the next 10), factored and solved by
-/// LAPACK: what the linear algebra of a Newton iteration costs at least, in general software on this machine.
+/// A symmetric positive definite band as wide as that of a rod's Hessian (4 unknowns per edge, each coupled to the next
+/// 10), factored and solved by LAPACK: what the linear algebra of a Newton iteration costs at least, in general
+/// software on this machine.
 class LapackBand {
 public:
   explicit LapackBand(int edges) : n_(4 * edges), matrix_(std::size_t(n_) * width, -0.09), right_(n_) {
     for (std::size_t j = 0; j < std::size_t(n_); ++j) matrix_[j * width] = 2;
   }
-  /// Seconds for dpbtrf and dpbtrs with one right-hand side; the copies that they work in are made before. Negative when LAPACK fails.
+  /// Seconds for dpbtrf and dpbtrs with one right-hand side; the copies that they work in are made before. Negative
+  /// when LAPACK fails.
   double factorAndSolve() {
     const PetscBLASInt kd = width - 1, ld = width, one = 1;
     PetscBLASInt bad_factor, bad_solve;

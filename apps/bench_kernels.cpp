@@ -1,9 +1,10 @@
 /// bench_kernels: what the pieces of a Newton iteration cost, and what this machine could do at best.
 ///
-/// Energy and derivatives of a bending and twisting cell, for both measures, one cell at a time (double) and several in the lanes of a pack,
-/// with their operations counted; the machine's multiply-add rate and copy bandwidth; the factorisation and solution of one rod's Hessian by the
-/// solver that tendril uses, and LAPACK's band solver at the same size as the yardstick. An option of Google Benchmark chooses among them;
-/// those of PETSc (-pc_factor_mat_solver_type mumps) act on the solver.
+/// Energy and derivatives of a bending and twisting cell, for both measures, one cell at a time (double) and several in
+/// the lanes of a pack, with their operations counted; the machine's multiply-add rate and copy bandwidth; the
+/// factorisation and solution of one rod's Hessian by the solver that tendril uses, and LAPACK's band solver at the
+/// same size as the yardstick. An option of Google Benchmark chooses among them; those of PETSc
+/// (-pc_factor_mat_solver_type mumps) act on the solver.
 ///
 /// Sample runs:
 ///   bench_kernels
@@ -21,7 +22,8 @@
 namespace tendril::bench {
 namespace {
 
-/// A number that counts what is done with it, as the kernels are written; signs, comparisons and selections are not counted.
+/// A number that counts what is done with it, as the kernels are written; signs, comparisons and selections are not
+/// counted.
 struct Counted {
   double value = 0;
   static inline long simple = 0;    ///< additions, subtractions, multiplications
@@ -88,7 +90,8 @@ Cell<double> plainCell(int k) {
   Cell<double> c;
   c.f0 = {Vec3::UnitX(), Vec3(0, std::cos(roll), std::sin(roll)), 1 + 0.1 * std::sin(0.9 * k)};
   c.f1.tangent = Vec3(std::cos(turning), std::sin(turning), 0);
-  c.f1.director = rotateAbout<double>(transport<double>(c.f0.director, c.f0.tangent, c.f1.tangent), c.f1.tangent, twist);
+  c.f1.director =
+      rotateAbout<double>(transport<double>(c.f0.director, c.f0.tangent, c.f1.tangent), c.f1.tangent, twist);
   c.f1.length = 1 + 0.1 * std::cos(1.1 * k);
   c.constants = {{1, 1.5, 0.7}, {0.1, -0.1, 0.05}, 0, {0.5, 0.5}, {1, 1}, 0, 1};
   return c;
@@ -117,7 +120,8 @@ template <class T> Cell<T> cellOf(int first) {
   return out;
 }
 
-template <Kernel kernel, Measure measure, class T> void call(const Cell<T> &cell, T &energy, CellDerivatives<T> &derivatives) {
+template <Kernel kernel, Measure measure, class T>
+void call(const Cell<T> &cell, T &energy, CellDerivatives<T> &derivatives) {
   if constexpr (kernel == Kernel::energy)
     energy = cellEnergy<measure>(cell.f0, cell.f1, cell.constants);
   else
@@ -147,12 +151,14 @@ template <Kernel kernel, Measure measure, class T> void cellKernel(benchmark::St
   run.counters["flops"] = double(Counted::simple + Counted::divisions);
   run.counters["divisions"] = double(Counted::divisions);
   run.counters["functions"] = double(Counted::functions);
-  run.counters["rate"] = benchmark::Counter(done * double(Counted::simple + Counted::divisions), benchmark::Counter::kIsRate);
+  run.counters["rate"] =
+      benchmark::Counter(done * double(Counted::simple + Counted::divisions), benchmark::Counter::kIsRate);
   const std::size_t written = kernel == Kernel::energy ? sizeof(double) : sizeof(CellDerivatives<double>);
   run.counters["bytes"] = double(sizeof(Cell<double>) + written);
 }
 
-/// Multiply-adds that depend on nothing but their own accumulator; enough accumulators to hide the latency of two units.
+/// Multiply-adds that depend on nothing but their own accumulator; enough accumulators to hide the latency of two
+/// units.
 void multiplyAdd(benchmark::State &run) {
   constexpr int accumulators = 16, rounds = 64;
   std::array<Pack, accumulators> sum;
@@ -165,7 +171,8 @@ void multiplyAdd(benchmark::State &run) {
       for (Pack &s : sum) s = s * factor + term; // contracted to one instruction
     benchmark::DoNotOptimize(sum);
   }
-  run.counters["rate"] = benchmark::Counter(double(run.iterations()) * 2.0 * accumulators * rounds * lanes<Pack>, benchmark::Counter::kIsRate);
+  run.counters["rate"] = benchmark::Counter(double(run.iterations()) * 2.0 * accumulators * rounds * lanes<Pack>,
+                                            benchmark::Counter::kIsRate);
 }
 
 /// Bytes read and bytes written per second, from arrays larger than any cache.
@@ -204,7 +211,8 @@ public:
     settings.dt = 5e-3;
     PetscFunctionBeginUser;
     PetscCall(simulation_.setUp(cantilevers(1, edges), settings));
-    PetscCall(simulation_.solver.rehearse(simulation_.state, TimeLoop::stepOf(settings, simulation_.state, settings.dt)));
+    PetscCall(
+        simulation_.solver.rehearse(simulation_.state, TimeLoop::stepOf(settings, simulation_.state, settings.dt)));
     PetscCall(SNESGetKSP(simulation_.solver.snes(), &ksp_));
     PetscCall(KSPGetOperators(ksp_, nullptr, &matrix_));
     PetscCall(MatCreateVecs(matrix_, x_.out(), b_.out()));
@@ -250,7 +258,8 @@ template <bool with_factor> void solver(benchmark::State &run) {
 template <Kernel kernel> void registerKernels(const std::string &name) {
   benchmark::RegisterBenchmark((name + "/tan/double").c_str(), cellKernel<kernel, Measure::tan, double>)->UseRealTime();
   benchmark::RegisterBenchmark((name + "/tan/pack").c_str(), cellKernel<kernel, Measure::tan, Pack>)->UseRealTime();
-  benchmark::RegisterBenchmark((name + "/angle/double").c_str(), cellKernel<kernel, Measure::angle, double>)->UseRealTime();
+  benchmark::RegisterBenchmark((name + "/angle/double").c_str(), cellKernel<kernel, Measure::angle, double>)
+      ->UseRealTime();
   benchmark::RegisterBenchmark((name + "/angle/pack").c_str(), cellKernel<kernel, Measure::angle, Pack>)->UseRealTime();
 }
 
@@ -260,10 +269,18 @@ void registerAll() {
   benchmark::RegisterBenchmark("machine/multiply_add", multiplyAdd)->UseRealTime();
   benchmark::RegisterBenchmark("machine/copy", copyBandwidth)->UseRealTime()->Unit(benchmark::kMillisecond);
   const std::vector<std::int64_t> edges{100, 400, 1600, 100000};
-  for (const std::int64_t n : edges) benchmark::RegisterBenchmark("lapack/factor_and_solve", lapack)->Arg(n)->UseManualTime()->Unit(benchmark::kMicrosecond);
   for (const std::int64_t n : edges)
-    benchmark::RegisterBenchmark("solver/factor_and_solve", solver<true>)->Arg(n)->UseRealTime()->Unit(benchmark::kMicrosecond);
-  for (const std::int64_t n : edges) benchmark::RegisterBenchmark("solver/solve", solver<false>)->Arg(n)->UseRealTime()->Unit(benchmark::kMicrosecond);
+    benchmark::RegisterBenchmark("lapack/factor_and_solve", lapack)
+        ->Arg(n)
+        ->UseManualTime()
+        ->Unit(benchmark::kMicrosecond);
+  for (const std::int64_t n : edges)
+    benchmark::RegisterBenchmark("solver/factor_and_solve", solver<true>)
+        ->Arg(n)
+        ->UseRealTime()
+        ->Unit(benchmark::kMicrosecond);
+  for (const std::int64_t n : edges)
+    benchmark::RegisterBenchmark("solver/solve", solver<false>)->Arg(n)->UseRealTime()->Unit(benchmark::kMicrosecond);
 }
 
 } // namespace

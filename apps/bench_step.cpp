@@ -1,8 +1,9 @@
 /// bench_step: what whole Newton steps cost, without output.
 ///
-/// Runs the time loop of tendril, several times from the same state, and prints one row: microseconds per edge and Newton iteration, milliseconds
-/// per step, memory per edge, an iteration in units of LAPACK's dpbtrf and dpbtrs on bands of as many edges, in turn with the runs; then how the time
-/// divides among the parts of a step. Without -scene, straight cantilevers let go under gravity:
+/// Runs the time loop of tendril, several times from the same state, and prints one row: microseconds per edge and
+/// Newton iteration, milliseconds per step, memory per edge, an iteration in units of LAPACK's dpbtrf and dpbtrs on
+/// bands of as many edges, in turn with the runs; then how the time divides among the parts of a step. Without -scene,
+/// straight cantilevers let go under gravity:
 ///
 ///     clamp |=====o=====o=====o ... o   -bench_rods of them side by side, -bench_edges of 1 cm each
 ///
@@ -32,11 +33,13 @@ PetscErrorCode readRequest(Request *r) {
   char scene[PETSC_MAX_PATH_LEN] = "", csv[PETSC_MAX_PATH_LEN] = "";
   PetscFunctionBeginUser;
   PetscOptionsBegin(PETSC_COMM_WORLD, "", "Options of bench_step", "docs/performance.md");
-  PetscCall(PetscOptionsString("-scene", "scene file (dynamics); otherwise straight cantilevers", "", scene, scene, sizeof scene, nullptr));
+  PetscCall(PetscOptionsString("-scene", "scene file (dynamics); otherwise straight cantilevers", "", scene, scene,
+                               sizeof scene, nullptr));
   PetscCall(PetscOptionsRangeInt("-bench_edges", "edges of a rod", "", r->edges, &r->edges, nullptr, 1, 100000000));
   PetscCall(PetscOptionsRangeInt("-bench_rods", "number of rods", "", r->rods, &r->rods, nullptr, 1, 10000000));
   PetscCall(PetscOptionsRangeInt("-bench_steps", "steps of a run", "", r->steps, &r->steps, nullptr, 1, 100000000));
-  PetscCall(PetscOptionsRangeInt("-bench_repeats", "runs, of which the fastest and the median are shown", "", r->repeats, &r->repeats, nullptr, 1, 1000));
+  PetscCall(PetscOptionsRangeInt("-bench_repeats", "runs, of which the fastest and the median are shown", "",
+                                 r->repeats, &r->repeats, nullptr, 1, 1000));
   PetscCall(PetscOptionsReal("-dt", "time step, 0: that of the scene, or 0.005 [s]", "", r->dt, &r->dt, nullptr));
   PetscCall(PetscOptionsString("-bench_csv", "file to which the row is added", "", csv, csv, sizeof csv, nullptr));
   PetscOptionsEnd();
@@ -82,8 +85,8 @@ PetscErrorCode eventSeconds(const char *name, double *seconds) {
   PetscFunctionReturn(0);
 }
 
-/// What PETSc's log has of the time since it began, in parts that do not overlap; the last is all of Newton, negative, so that adding the time of
-/// the whole loop leaves the rest of the step.
+/// What PETSc's log has of the time since it began, in parts that do not overlap; the last is all of Newton, negative,
+/// so that adding the time of the whole loop leaves the rest of the step.
 PetscErrorCode readLog(std::vector<Part> *parts) {
   double derivatives = 0, fill = 0, factor = 0, solve = 0, configuration = 0, energy = 0, search = 0, newton = 0;
   PetscFunctionBeginUser;
@@ -137,7 +140,8 @@ PetscErrorCode makeScene(const Request &request, Scene *scene, LoopSettings *set
     *scene = cantilevers(int(request.rods), int(request.edges));
   else {
     SceneFile file = readScene(request.scene);
-    if (file.run.mode != "dynamic") throw SceneError("option -scene: bench_step runs dynamics; '" + request.scene + "' asks for " + file.run.mode);
+    if (file.run.mode != "dynamic")
+      throw SceneError("option -scene: bench_step runs dynamics; '" + request.scene + "' asks for " + file.run.mode);
     *scene = std::move(file.scene);
     settings->dt = file.run.dt;
   }
@@ -149,8 +153,8 @@ PetscErrorCode makeScene(const Request &request, Scene *scene, LoopSettings *set
 
 struct Measured {
   int rods, edges;
-  StepsTaken taken;       ///< steps and iterations; they are the same in every run
-  double fastest, median; ///< seconds of a run
+  StepsTaken taken;         ///< steps and iterations; they are the same in every run
+  double fastest, median;   ///< seconds of a run
   double lapack = HUGE_VAL; ///< seconds of dpbtrf and dpbtrs for all edges, fastest
   double bytes_per_edge;
   std::vector<Part> parts;
@@ -199,16 +203,20 @@ PetscErrorCode measure(const Request &request, Measured *m) {
 }
 
 void print(const Measured &m) {
-  std::printf("%8s %9s %7s %11s %9s | us per edge and iteration | ms per step       | bytes per\n", "rods", "edges", "steps", "iterations", "rejected");
-  std::printf("%8s %9s %7s %11s %9s | %10s %14s | %8s %8s | edge\n", "", "", "", "", "", "fastest", "median", "fastest", "median");
-  std::printf("%8d %9d %7d %11d %9d | %10.3f %14.3f | %8.4g %8.4g | %.0f\n\n", m.rods, m.edges, m.taken.steps, m.taken.newton_iterations, m.taken.rejected,
-              m.perEdge(m.fastest), m.perEdge(m.median), m.perStep(m.fastest), m.perStep(m.median), m.bytes_per_edge);
+  std::printf("%8s %9s %7s %11s %9s | us per edge and iteration | ms per step       | bytes per\n", "rods", "edges",
+              "steps", "iterations", "rejected");
+  std::printf("%8s %9s %7s %11s %9s | %10s %14s | %8s %8s | edge\n", "", "", "", "", "", "fastest", "median", "fastest",
+              "median");
+  std::printf("%8d %9d %7d %11d %9d | %10.3f %14.3f | %8.4g %8.4g | %.0f\n\n", m.rods, m.edges, m.taken.steps,
+              m.taken.newton_iterations, m.taken.rejected, m.perEdge(m.fastest), m.perEdge(m.median),
+              m.perStep(m.fastest), m.perStep(m.median), m.bytes_per_edge);
   std::printf("an iteration is %.3f times dpbtrf and dpbtrs\n\n", m.perLapack());
   double total = 0;
   for (const Part &part : m.parts) total += part.seconds;
   std::printf("parts of the fastest of as many runs with PETSc's log:\n");
   for (const Part &part : m.parts)
-    std::printf("  %-18s %5.1f %%  %8.3f us per edge and iteration\n", part.name.c_str(), 100 * part.seconds / total, m.perEdge(part.seconds));
+    std::printf("  %-18s %5.1f %%  %8.3f us per edge and iteration\n", part.name.c_str(), 100 * part.seconds / total,
+                m.perEdge(part.seconds));
   std::printf("memory: resident set before the scene is built, to after the first step\n");
 }
 
@@ -217,12 +225,14 @@ void addRow(const std::string &path, const std::string &scene, const Measured &m
   std::ofstream file(path, std::ios::app);
   if (!file) throw SceneError("option -bench_csv: '" + path + "' cannot be written");
   if (fresh) {
-    file << "scene,rods,edges,steps,newton_iterations,rejected_steps,us_fastest,us_median,step_ms_fastest,step_ms_median,bytes_per_edge,per_lapack";
+    file << "scene,rods,edges,steps,newton_iterations,rejected_steps,us_fastest,us_median,step_ms_fastest,step_ms_"
+            "median,bytes_per_edge,per_lapack";
     for (const Part &part : m.parts) file << ",us_" << part.name;
     file << '\n';
   }
-  file << scene << ',' << m.rods << ',' << m.edges << ',' << m.taken.steps << ',' << m.taken.newton_iterations << ',' << m.taken.rejected << ','
-       << m.perEdge(m.fastest) << ',' << m.perEdge(m.median) << ',' << m.perStep(m.fastest) << ',' << m.perStep(m.median) << ',' << m.bytes_per_edge << ',' << m.perLapack();
+  file << scene << ',' << m.rods << ',' << m.edges << ',' << m.taken.steps << ',' << m.taken.newton_iterations << ','
+       << m.taken.rejected << ',' << m.perEdge(m.fastest) << ',' << m.perEdge(m.median) << ',' << m.perStep(m.fastest)
+       << ',' << m.perStep(m.median) << ',' << m.bytes_per_edge << ',' << m.perLapack();
   for (const Part &part : m.parts) file << ',' << m.perEdge(part.seconds);
   file << '\n';
 }
@@ -245,7 +255,9 @@ PetscErrorCode execute() {
 } // namespace tendril::bench
 
 int main(int argc, char **argv) {
-  if (PetscInitialize(&argc, &argv, nullptr, "bench_step: what whole Newton steps cost, without output (docs/performance.md).\n")) return 1;
+  if (PetscInitialize(&argc, &argv, nullptr,
+                      "bench_step: what whole Newton steps cost, without output (docs/performance.md).\n"))
+    return 1;
   int exit_code = 1;
   try {
     if (!tendril::registerEvents() && !tendril::registerSolvers() && !tendril::bench::execute()) exit_code = 0;

@@ -1,7 +1,9 @@
-/// let_go: a cantilever sags under its weight, gravity is switched off, and it swings. Shows the library (docs/library.md): one scene is solved
-/// in statics, its answer is written into the state of another, which runs in time.
+/// let_go: a cantilever sags under its weight, gravity is switched off, and it swings. Shows the library
+/// (docs/library.md): one scene is solved in statics, its answer is written into the state of another, which runs in
+/// time.
 ///
-///     clamp |=====o-----o-----o-----o   statics: down to where it hangs;  dynamics without gravity: up and down about straight
+///     clamp |=====o-----o-----o-----o   statics: down to where it hangs;  dynamics without gravity: up and down about
+///     straight
 ///
 /// Sample run, from the root of the repository; it is a test:
 ///   let_go data/scenes/cantilever.yaml
@@ -14,7 +16,8 @@
 namespace {
 
 /// Runs a simulation to the end of its settings; `seen` after each step.
-PetscErrorCode run(tendril::Simulation &simulation, const tendril::LoopSettings &settings, const std::function<void(const tendril::State &)> &seen) {
+PetscErrorCode run(tendril::Simulation &simulation, const tendril::LoopSettings &settings,
+                   const std::function<void(const tendril::State &)> &seen) {
   PetscFunctionBeginUser;
   tendril::TimeLoop loop(simulation.solver, settings);
   auto observe = [&](const tendril::State &state, const tendril::Diagnostics &) -> PetscErrorCode {
@@ -30,7 +33,8 @@ PetscErrorCode run(tendril::Simulation &simulation, const tendril::LoopSettings 
 PetscErrorCode letGo(const char *file) {
   PetscFunctionBeginUser;
   tendril::Scene scene = tendril::readScene(file).scene;
-  for (tendril::Rod &rod : scene.rods) rod.material = tendril::homogeneousMaterial({tendril::SectionShape::circle, {0.005, 0.005}}, 1e10, 4e9, 1200);
+  for (tendril::Rod &rod : scene.rods)
+    rod.material = tendril::homogeneousMaterial({tendril::SectionShape::circle, {0.005, 0.005}}, 1e10, 4e9, 1200);
 
   tendril::LoopSettings statics;
   statics.dynamic = false;
@@ -63,7 +67,8 @@ PetscErrorCode letGo(const char *file) {
     time = state.time;
   }));
   if (crossings.size() < 2) throw std::runtime_error("the rod does not swing");
-  std::printf("period %.5f s over %zu swings\n", (crossings.back() - crossings.front()) / double(crossings.size() - 1), crossings.size() - 1);
+  std::printf("period %.5f s over %zu swings\n", (crossings.back() - crossings.front()) / double(crossings.size() - 1),
+              crossings.size() - 1);
   PetscFunctionReturn(0);
 }
 

@@ -1,7 +1,8 @@
 /// tendril: dynamics and statics of the rods of a scene.
 ///
-/// Each step minimises an incremental potential over the configuration manifold of framed polylines (docs/theory.md): stretch, bend and twist
-/// of discrete elastic rods (Bergou et al. 2008, 2010), inertia and dissipation, by Newton with the exact Hessian.
+/// Each step minimises an incremental potential over the configuration manifold of framed polylines (docs/theory.md):
+/// stretch, bend and twist of discrete elastic rods (Bergou et al. 2008, 2010), inertia and dissipation, by Newton with
+/// the exact Hessian.
 ///
 ///     clamp |=====o-----o-----o-----o   vertex o: position;  edge -----: director (twist)
 ///

@@ -10,7 +10,9 @@
 
 namespace tendril {
 
-int roundedUp(double edges, int multiple) { return multiple * std::max(1, int(std::ceil(edges / multiple * (1 - 1e-12)))); }
+int roundedUp(double edges, int multiple) {
+  return multiple * std::max(1, int(std::ceil(edges / multiple * (1 - 1e-12))));
+}
 
 std::string nameOf(Quantity q) { return q == Quantity::tip ? "tip" : q == Quantity::energy ? "energy" : "position"; }
 
@@ -26,7 +28,9 @@ void Choice::say(const std::string &line) {
 void Choice::sayEdges(const Scene &scene, const Accuracy &accuracy) {
   constexpr std::size_t most_lines = 4;
   auto errors = [&](std::size_t r) {
-    return shortText(error[r]) + (step_error.empty() ? "" : " (" + shortText(edge_error[r]) + " by the edges, " + shortText(step_error[r]) + " by the steps)");
+    return shortText(error[r]) + (step_error.empty() ? ""
+                                                     : " (" + shortText(edge_error[r]) + " by the edges, " +
+                                                           shortText(step_error[r]) + " by the steps)");
   };
   std::map<std::pair<int, std::string>, int> alike;
   std::vector<std::size_t> first; // of those alike
@@ -35,10 +39,13 @@ void Choice::sayEdges(const Scene &scene, const Accuracy &accuracy) {
   for (std::size_t k = 0; k < std::min(first.size(), most_lines); ++k) {
     const std::size_t r = first[k];
     const int others = alike[{edges[r], errors(r)}] - 1;
-    say("accuracy: rod '" + scene.rods[r].name + "'" + (others > 0 ? " and " + std::to_string(others) + " like it" : "") + ": edges " +
-        std::to_string(edges[r]) + " for " + shortText(accuracy.tolerance) + ": estimated error of the " + nameOf(accuracy.of) + " " + errors(r));
+    say("accuracy: rod '" + scene.rods[r].name + "'" +
+        (others > 0 ? " and " + std::to_string(others) + " like it" : "") + ": edges " + std::to_string(edges[r]) +
+        " for " + shortText(accuracy.tolerance) + ": estimated error of the " + nameOf(accuracy.of) + " " + errors(r));
   }
-  if (first.size() > most_lines) say("... and " + std::to_string(first.size() - most_lines) + " more kinds of rods; options.yaml has the edges of each");
+  if (first.size() > most_lines)
+    say("... and " + std::to_string(first.size() - most_lines) +
+        " more kinds of rods; options.yaml has the edges of each");
 }
 
 namespace {
@@ -74,8 +81,8 @@ struct Round {
   std::string none;          ///< why there is no estimate
 };
 
-PetscErrorCode estimateAt(const Scene &scene, const std::vector<Drawing> &drawings, const LoopSettings &settings, const std::vector<int> &edges, Quantity of,
-                          Round *round) {
+PetscErrorCode estimateAt(const Scene &scene, const std::vector<Drawing> &drawings, const LoopSettings &settings,
+                          const std::vector<int> &edges, Quantity of, Round *round) {
   PetscFunctionBeginUser;
   std::vector<int> twice = edges;
   for (int &n : twice) n *= 2;
@@ -104,13 +111,16 @@ std::vector<int> edgeMultiples(const Scene &scene, const std::vector<Drawing> &d
   return multiple;
 }
 
-std::vector<int> firstEdges(const Scene &scene, const std::vector<Drawing> &drawings, const std::vector<int> &multiple) {
+std::vector<int> firstEdges(const Scene &scene, const std::vector<Drawing> &drawings,
+                            const std::vector<int> &multiple) {
   std::vector<int> edges;
-  for (std::size_t r = 0; r < scene.rods.size(); ++r) edges.push_back(firstEdges(scene.rods[r], drawings[r], multiple[r]));
+  for (std::size_t r = 0; r < scene.rods.size(); ++r)
+    edges.push_back(firstEdges(scene.rods[r], drawings[r], multiple[r]));
   return edges;
 }
 
-PetscErrorCode chooseEdges(const Scene &scene, const std::vector<Drawing> &drawings, const LoopSettings &settings, const Accuracy &accuracy, Choice *choice) {
+PetscErrorCode chooseEdges(const Scene &scene, const std::vector<Drawing> &drawings, const LoopSettings &settings,
+                           const Accuracy &accuracy, Choice *choice) {
   PetscFunctionBeginUser;
   choice->loop = settings;
   const std::size_t rods = scene.rods.size();
@@ -119,9 +129,12 @@ PetscErrorCode chooseEdges(const Scene &scene, const std::vector<Drawing> &drawi
   const std::string asked = askedFor(accuracy);
   for (int round = 0; round < most_rounds; ++round) {
     if (*std::max_element(edges.begin(), edges.end()) > most_edges)
-      throw SceneError(asked + " needs more than " + shortText(most_edges) + " edges a rod, which rounding forbids; write a larger tolerance");
+      throw SceneError(asked + " needs more than " + shortText(most_edges) +
+                       " edges a rod, which rounding forbids; write a larger tolerance");
     Round found;
-    const Doing here([&](std::ostream &out) { out << "accuracy, with " << edges[0] << " edges of rod '" << scene.rods[0].name << "'"; });
+    const Doing here([&](std::ostream &out) {
+      out << "accuracy, with " << edges[0] << " edges of rod '" << scene.rods[0].name << "'";
+    });
     PetscCall(estimateAt(scene, drawings, settings, edges, accuracy.of, &found));
     double worst = 0;
     std::size_t where = 0;
@@ -133,8 +146,9 @@ PetscErrorCode chooseEdges(const Scene &scene, const std::vector<Drawing> &drawi
       choice->sayEdges(scene, accuracy);
       PetscFunctionReturn(0);
     }
-    choice->say("accuracy: tried " + std::to_string(edges[where]) + " edges of rod '" + scene.rods[where].name +
-                "': " + (found.none.empty() ? "estimated error of the " + nameOf(accuracy.of) + " " + shortText(worst) : found.none));
+    choice->say(
+        "accuracy: tried " + std::to_string(edges[where]) + " edges of rod '" + scene.rods[where].name + "': " +
+        (found.none.empty() ? "estimated error of the " + nameOf(accuracy.of) + " " + shortText(worst) : found.none));
     for (std::size_t r = 0; r < rods; ++r) {
       if (!found.none.empty()) {
         edges[r] *= 2;
@@ -143,24 +157,25 @@ PetscErrorCode chooseEdges(const Scene &scene, const std::vector<Drawing> &drawi
       if (found.error[r] <= accept * accuracy.tolerance) continue;
       const double factor = std::sqrt(found.error[r] / (aim * accuracy.tolerance));
       if (edges[r] * factor > 10 * most_edges)
-        throw SceneError(asked + " needs about " + shortText(edges[r] * factor) + " edges of rod '" + scene.rods[r].name +
-                         "', more than rounding allows; write a larger tolerance");
+        throw SceneError(asked + " needs about " + shortText(edges[r] * factor) + " edges of rod '" +
+                         scene.rods[r].name + "', more than rounding allows; write a larger tolerance");
       // A first estimate may be far off: not more than 16 times as many at once.
       edges[r] = std::max(roundedUp(edges[r] * std::min(factor, 16.0), multiple[r]), edges[r] + multiple[r]);
     }
   }
-  throw SceneError(asked + " was not reached: " + choice->lines.back().substr(std::string("accuracy: ").size()) + "; write a larger tolerance" +
-                   (accuracy.tolerance < 1e-6 ? " or a smaller -snes_rtol" : ""));
+  throw SceneError(asked + " was not reached: " + choice->lines.back().substr(std::string("accuracy: ").size()) +
+                   "; write a larger tolerance" + (accuracy.tolerance < 1e-6 ? " or a smaller -snes_rtol" : ""));
 }
 
-PetscErrorCode chooseResolution(const Scene &scene, const std::vector<Drawing> &drawings, const LoopSettings &settings, const Accuracy &accuracy,
-                                Choice *choice) {
+PetscErrorCode chooseResolution(const Scene &scene, const std::vector<Drawing> &drawings, const LoopSettings &settings,
+                                const Accuracy &accuracy, Choice *choice) {
   PetscFunctionBeginUser;
   const std::vector<int> first = firstAlike(scene, drawings);
   std::vector<int> kinds, kind_of(first.size()); // rods solved; which of them stands for each
   std::vector<Drawing> kept;
   choice->count.clear();
-  const bool together = accuracy.of == Quantity::energy && std::any_of(first.begin(), first.end(), [](int r) { return r != 0; });
+  const bool together =
+      accuracy.of == Quantity::energy && std::any_of(first.begin(), first.end(), [](int r) { return r != 0; });
   for (int r = 0; r < int(first.size()); ++r) {
     const bool own = first[r] == r || together;
     kind_of[r] = own ? int(kinds.size()) : kind_of[first[r]];
@@ -172,7 +187,8 @@ PetscErrorCode chooseResolution(const Scene &scene, const std::vector<Drawing> &
     kept.push_back(drawings[r]);
     choice->count.push_back(1);
   }
-  PetscCall((settings.dynamic ? chooseEdgesAndSteps : chooseEdges)(withRods(scene, kinds), kept, settings, accuracy, choice));
+  PetscCall(
+      (settings.dynamic ? chooseEdgesAndSteps : chooseEdges)(withRods(scene, kinds), kept, settings, accuracy, choice));
   auto expand = [&](auto &values) {
     auto all = values;
     all.clear();

@@ -11,10 +11,11 @@
 namespace tendril {
 namespace {
 
-constexpr int sample_count = 32;         ///< in the time of a run; also the fewest steps
-constexpr double small = 0.25;           ///< part of the tolerance below which an error needs no order
-constexpr double least_order = 0.7;      ///< below, halving tells nothing of the error that is left
-constexpr double fair_order = 0.6;       ///< of the formal order; below, the order may still rise with shorter steps or edges, unless
+constexpr int sample_count = 32;    ///< in the time of a run; also the fewest steps
+constexpr double small = 0.25;      ///< part of the tolerance below which an error needs no order
+constexpr double least_order = 0.7; ///< below, halving tells nothing of the error that is left
+constexpr double fair_order =
+    0.6; ///< of the formal order; below, the order may still rise with shorter steps or edges, unless
 constexpr double settled_order = 0.9;    ///< it is at least this, as of methods that lose one,
 constexpr double settled = 0.15;         ///< and changes by less than this from one doubling to the next
 constexpr double reach = 1.5;            ///< how far beyond its runs a prediction is trusted
@@ -25,14 +26,16 @@ constexpr int most_coarse_steps = 4096; ///< or 4 times those of the scene
 constexpr int most_coarse_factor = 64;  ///< of the first edges, or 4 times those of the scene
 constexpr int more_tries = 8;           ///< where a prediction led to finer runs, so many times theirs
 
-/// How fine a run is. Adapted steps have a number too, by which their tolerance goes as an error of the integrator's order goes with steps.
+/// How fine a run is. Adapted steps have a number too, by which their tolerance goes as an error of the integrator's
+/// order goes with steps.
 struct Resolution {
   std::vector<int> edges; ///< per rod
   int steps;
   bool operator<(const Resolution &other) const { return std::tie(edges, steps) < std::tie(other.edges, other.steps); }
 };
 
-/// Errors of three runs of a rod, each with half the step or edge of the one before, by the ratio of their differences (Aitken).
+/// Errors of three runs of a rod, each with half the step or edge of the one before, by the ratio of their differences
+/// (Aitken).
 struct Trend {
   double error[3] = {0, 0, 0}; ///< of the coarsest to the finest
   double seen = 0;             ///< the order as seen
@@ -92,18 +95,22 @@ struct Found {
 
 class Chooser {
 public:
-  Chooser(const Scene &scene, const std::vector<Drawing> &drawings, const LoopSettings &settings, const Accuracy &accuracy, Choice &choice)
-      : scene_(scene), drawings_(drawings), settings_(settings), accuracy_(accuracy), choice_(choice), multiple_(edgeMultiples(scene, drawings)),
-        first_(firstEdges(scene, drawings, multiple_)), order_(makeIntegrator(settings.integrator)->order()), adapts_(settings.adapt == Adaptation::error) {
+  Chooser(const Scene &scene, const std::vector<Drawing> &drawings, const LoopSettings &settings,
+          const Accuracy &accuracy, Choice &choice)
+      : scene_(scene), drawings_(drawings), settings_(settings), accuracy_(accuracy), choice_(choice),
+        multiple_(edgeMultiples(scene, drawings)), first_(firstEdges(scene, drawings, multiple_)),
+        order_(makeIntegrator(settings.integrator)->order()), adapts_(settings.adapt == Adaptation::error) {
     const double given = settings.output_interval, even = settings.t_end / sample_count;
     landing_ = given > 0 ? given / std::ceil(given / even) : even;
     const int stride = std::max(1, int(even / landing_ * (1 + 1e-9)));
     const double interval = adapts_ ? stride * landing_ : even;
     for (int k = 1; k * interval <= settings.t_end * (1 + 1e-12); ++k) times_.push_back(k * interval);
-    if (const double frames = settings.t_end / std::max(given, 1e-300); std::abs(frames - std::round(frames)) < 1e-9 * frames && frames <= most_steps)
+    if (const double frames = settings.t_end / std::max(given, 1e-300);
+        std::abs(frames - std::round(frames)) < 1e-9 * frames && frames <= most_steps)
       frames_ = std::max(1, int(std::round(frames)));
     most_.steps = int(std::clamp(4 * settings.t_end / settings.dt, double(most_coarse_steps), most_steps));
-    for (std::size_t r = 0; r < scene.rods.size(); ++r) most_.edges.push_back(std::max(most_coarse_factor * first_[r], 4 * scene.rods[r].edges()));
+    for (std::size_t r = 0; r < scene.rods.size(); ++r)
+      most_.edges.push_back(std::max(most_coarse_factor * first_[r], 4 * scene.rods[r].edges()));
   }
 
   PetscErrorCode choose() {
@@ -113,14 +120,15 @@ public:
       Found found;
       PetscCall(trends(base, &Chooser::withSteps, order_, seen_steps_, &found.steps));
       if (!converges(found.steps)) {
-        moreSteps(base, found.steps.empty() ? failure_ : "no convergence" + between(base) + text(found.steps[worst(found.steps)]));
+        moreSteps(base, found.steps.empty() ? failure_
+                                            : "no convergence" + between(base) + text(found.steps[worst(found.steps)]));
         continue;
       }
       if (bool resolved; !start_resolved_) {
         PetscCall(resolvesStart(base, &resolved));
         if (!resolved) {
-          moreSteps(base,
-                    "steps" + between(base) + text(found.steps[worst(found.steps)]) + ", but they miss motion in the first " + shortText(times_[0]) + " s");
+          moreSteps(base, "steps" + between(base) + text(found.steps[worst(found.steps)]) +
+                              ", but they miss motion in the first " + shortText(times_[0]) + " s");
           continue;
         }
         start_resolved_ = true;
@@ -135,7 +143,8 @@ public:
         moreEdges(base, found.edges);
         continue;
       }
-      for (std::size_t r = 0; r < found.edges.size(); ++r) found.correlation.push_back(correlation(found.edges[r].errors, found.steps[r].errors));
+      for (std::size_t r = 0; r < found.edges.size(); ++r)
+        found.correlation.push_back(correlation(found.edges[r].errors, found.steps[r].errors));
       const Resolution best = cheapest(base, found);
       if (within(base, best)) {
         take(base, best, found);
@@ -204,21 +213,23 @@ private:
     if (is_new) {
       LoopSettings s = settingsAt(resolution.steps);
       const Doing here([&](std::ostream &out) {
-        out << "accuracy, run " << probes_ + 1 << " with " << resolution.edges[0] << " edges of rod '" << scene_.rods[0].name << "' and "
-            << stepText(resolution.steps);
+        out << "accuracy, run " << probes_ + 1 << " with " << resolution.edges[0] << " edges of rod '"
+            << scene_.rods[0].name << "' and " << stepText(resolution.steps);
       });
       if (!adapts_ && s.dt_min == 0) s.dt_min = s.dt / 16; // where shorter ones are needed, all should be
       PetscCall(sample(redraw(scene_, drawings_, resolution.edges), s, times_, &place->second));
       count(place->second);
-      if (!place->second.failure.empty()) failure_ = "with " + stepText(resolution.steps) + ", " + place->second.failure;
+      if (!place->second.failure.empty())
+        failure_ = "with " + stepText(resolution.steps) + ", " + place->second.failure;
     }
     *out = &place->second;
     PetscFunctionReturn(0);
   }
 
-  /// Per rod, from runs refined once and twice; none where one fails. \param before orders seen last, replaced by those seen now
-  PetscErrorCode trends(const Resolution &base, Resolution (Chooser::*refined)(const Resolution &, int) const, int formal, std::vector<double> &before,
-                        std::vector<Trend> *out) {
+  /// Per rod, from runs refined once and twice; none where one fails. \param before orders seen last, replaced by those
+  /// seen now
+  PetscErrorCode trends(const Resolution &base, Resolution (Chooser::*refined)(const Resolution &, int) const,
+                        int formal, std::vector<double> &before, std::vector<Trend> *out) {
     PetscFunctionBeginUser;
     const Samples *run[3];
     for (int k = 0; k < 3; ++k) {
@@ -228,7 +239,8 @@ private:
     const std::vector<Errors> first = difference(scene_, *run[0], *run[1], base.edges, accuracy_.of);
     std::vector<Errors> second = difference(scene_, *run[1], *run[2], base.edges, accuracy_.of);
     for (std::size_t r = 0; r < first.size(); ++r)
-      out->push_back(trendOf(first[r], std::move(second[r]), formal, accuracy_.tolerance, r < before.size() ? std::optional(before[r]) : std::nullopt));
+      out->push_back(trendOf(first[r], std::move(second[r]), formal, accuracy_.tolerance,
+                             r < before.size() ? std::optional(before[r]) : std::nullopt));
     before.clear();
     for (const Trend &t : *out) before.push_back(t.seen);
     PetscFunctionReturn(0);
@@ -239,20 +251,23 @@ private:
   }
   static std::size_t worst(const std::vector<Trend> &trends) {
     return std::max_element(trends.begin(), trends.end(),
-                            [](const Trend &a, const Trend &b) { return std::pair(!a.trusted, a.finest()) < std::pair(!b.trusted, b.finest()); }) -
+                            [](const Trend &a, const Trend &b) {
+                              return std::pair(!a.trusted, a.finest()) < std::pair(!b.trusted, b.finest());
+                            }) -
            trends.begin();
   }
   static std::string text(const Trend &t) { return shortText(t.finest()) + " (order " + shortText(t.seen) + ")"; }
 
   [[noreturn]] void giveUp(const std::string &what) const {
-    throw SceneError(
-        askedFor(accuracy_) + ": " + what +
-        ". Motion that the smallest difference changes, as of what buckles or folds by chance, has no answer to converge to; vibrations through very many "
-        "periods need more steps than were tried. Write a smaller -t_end or a larger tolerance");
+    throw SceneError(askedFor(accuracy_) + ": " + what +
+                     ". Motion that the smallest difference changes, as of what buckles or folds by chance, has no "
+                     "answer to converge to; vibrations through very many "
+                     "periods need more steps than were tried. Write a smaller -t_end or a larger tolerance");
   }
 
   std::string between(const Resolution &base) const {
-    return " from " + stepText(base.steps) + " to " + stepText(4 * base.steps) + ", estimated error of the " + nameOf(accuracy_.of) + " ";
+    return " from " + stepText(base.steps) + " to " + stepText(4 * base.steps) + ", estimated error of the " +
+           nameOf(accuracy_.of) + " ";
   }
 
   void moreSteps(Resolution &base, const std::string &why) {
@@ -261,8 +276,8 @@ private:
     if (base.steps > most_.steps) giveUp(why);
   }
 
-  /// Whether the series of steps is right in the first of the times, by adapted steps that begin with short ones: where steps are much longer than the motion,
-  /// methods that damp agree at all lengths on a rod at rest.
+  /// Whether the series of steps is right in the first of the times, by adapted steps that begin with short ones: where
+  /// steps are much longer than the motion, methods that damp agree at all lengths on a rod at rest.
   PetscErrorCode resolvesStart(const Resolution &base, bool *resolved) {
     PetscFunctionBeginUser;
     if (start_.edges.empty()) {
@@ -282,9 +297,13 @@ private:
     if (!start_.failure.empty()) PetscFunctionReturn(0);
     const Samples *run[3];
     for (int k = 0; k < 3; ++k) PetscCall(probe(withSteps(base, 1 << k), &run[k]));
-    auto apart = [&](const Samples &a, const Samples &b) { return difference(scene_, a.first(), b.first(), base.edges, Quantity::position); };
-    const std::vector<Errors> once = apart(*run[0], *run[1]), twice = apart(*run[1], *run[2]), all = apart(*run[2], start_);
-    for (std::size_t r = 0; r < all.size(); ++r) *resolved = *resolved && sizeOf(all[r]) <= 2 * (sizeOf(once[r]) + sizeOf(twice[r])) + accuracy_.tolerance;
+    auto apart = [&](const Samples &a, const Samples &b) {
+      return difference(scene_, a.first(), b.first(), base.edges, Quantity::position);
+    };
+    const std::vector<Errors> once = apart(*run[0], *run[1]), twice = apart(*run[1], *run[2]),
+                              all = apart(*run[2], start_);
+    for (std::size_t r = 0; r < all.size(); ++r)
+      *resolved = *resolved && sizeOf(all[r]) <= 2 * (sizeOf(once[r]) + sizeOf(twice[r])) + accuracy_.tolerance;
     PetscFunctionReturn(0);
   }
 
@@ -293,21 +312,23 @@ private:
       if (edges[r].trusted) continue;
       base.edges[r] *= 2;
       if (base.edges[r] > most_.edges[r] || 4 * base.edges[r] > most_edges)
-        giveUp("no convergence from " + std::to_string(base.edges[r] / 2) + " to " + std::to_string(2 * base.edges[r]) + " edges of rod '" +
-               scene_.rods[r].name + "', estimated error " + text(edges[r]));
+        giveUp("no convergence from " + std::to_string(base.edges[r] / 2) + " to " + std::to_string(2 * base.edges[r]) +
+               " edges of rod '" + scene_.rods[r].name + "', estimated error " + text(edges[r]));
     }
   }
 
   void say(const Resolution &base, const Found &found) {
     const std::size_t r = worst(found.edges);
     const std::string finest = shortText(adapts_ ? settingsAt(4 * base.steps).dt_rtol : settingsAt(4 * base.steps).dt);
-    choice_.say("accuracy: " + std::to_string(base.edges[r]) + " to " + std::to_string(4 * base.edges[r]) + " edges of rod '" + scene_.rods[r].name + "', " +
-                stepText(base.steps) + " to " + finest + ": estimated error of the " + nameOf(accuracy_.of) + " " + text(found.edges[r]) + " by the edges, " +
+    choice_.say("accuracy: " + std::to_string(base.edges[r]) + " to " + std::to_string(4 * base.edges[r]) +
+                " edges of rod '" + scene_.rods[r].name + "', " + stepText(base.steps) + " to " + finest +
+                ": estimated error of the " + nameOf(accuracy_.of) + " " + text(found.edges[r]) + " by the edges, " +
                 text(found.steps[worst(found.steps)]) + " by the steps");
   }
 
-  /// The least edges x steps for which the two errors of each rod together come to the tolerance. For one rod with errors a/N^2 and b/n^p that add up
-  /// that is where a/N^2 : b/n^p = p : 2 (Lagrange's multiplier), their squares where the two have nothing to do with each other.
+  /// The least edges x steps for which the two errors of each rod together come to the tolerance. For one rod with
+  /// errors a/N^2 and b/n^p that add up that is where a/N^2 : b/n^p = p : 2 (Lagrange's multiplier), their squares
+  /// where the two have nothing to do with each other.
   Resolution cheapest(const Resolution &base, const Found &found) const {
     Resolution best{{}, 0};
     double least = std::numeric_limits<double>::infinity();
@@ -315,7 +336,8 @@ private:
       Resolution r{{}, roundedUp(n, n < 4.0 * frames_ || adapts_ ? 1 : frames_)};
       for (std::size_t k = 0; k < found.edges.size(); ++k) {
         const Trend &edges = found.edges[k];
-        const double room = roomBeside(found.steps[k].at(r.steps / (4.0 * base.steps)), found.correlation[k], aim * accuracy_.tolerance);
+        const double room = roomBeside(found.steps[k].at(r.steps / (4.0 * base.steps)), found.correlation[k],
+                                       aim * accuracy_.tolerance);
         if (room <= 0) break;
         const double count = std::min(4.0 * base.edges[k] * edges.reaching(room), 1e8);
         r.edges.push_back(std::max(first_[k], roundedUp(std::max(count, 0.5 * base.edges[k]), multiple_[k])));
@@ -327,8 +349,8 @@ private:
       if (work > 4 * least) break;
     }
     if (best.steps == 0 || best.steps > most_steps)
-      throw SceneError(askedFor(accuracy_) + " needs more than " + shortText(most_steps) + " steps; write a larger tolerance" +
-                       (order_ < 2 ? " or an -integrator of second order" : ""));
+      throw SceneError(askedFor(accuracy_) + " needs more than " + shortText(most_steps) +
+                       " steps; write a larger tolerance" + (order_ < 2 ? " or an -integrator of second order" : ""));
     return best;
   }
 
@@ -350,11 +372,12 @@ private:
     next.steps = std::clamp(roundedUp(best.steps / 4.0, sample_count), base.steps, most_growth * base.steps);
     most_.steps = std::max(most_.steps, more_tries * next.steps);
     for (std::size_t r = 0; r < best.edges.size(); ++r) {
-      next.edges[r] = std::clamp(roundedUp(best.edges[r] / 4.0, multiple_[r]), base.edges[r], most_growth * base.edges[r]);
+      next.edges[r] =
+          std::clamp(roundedUp(best.edges[r] / 4.0, multiple_[r]), base.edges[r], most_growth * base.edges[r]);
       most_.edges[r] = std::max(most_.edges[r], more_tries * next.edges[r]);
       if (4 * next.edges[r] > most_edges)
-        throw SceneError(askedFor(accuracy_) + " needs about " + shortText(best.edges[r]) + " edges of rod '" + scene_.rods[r].name +
-                         "', more than rounding allows; write a larger tolerance");
+        throw SceneError(askedFor(accuracy_) + " needs about " + shortText(best.edges[r]) + " edges of rod '" +
+                         scene_.rods[r].name + "', more than rounding allows; write a larger tolerance");
     }
     return next;
   }
@@ -366,26 +389,28 @@ private:
     double rounding_error = 0;
     for (const auto &[resolution, run] : runs_) rounding_error = std::max(rounding_error, run.rounding_error);
     if (rounding_error > accuracy_.tolerance)
-      throw SceneError(askedFor(accuracy_) + ": rounding alone makes errors of " + shortText(rounding_error) + "; write a larger tolerance");
+      throw SceneError(askedFor(accuracy_) + ": rounding alone makes errors of " + shortText(rounding_error) +
+                       "; write a larger tolerance");
     for (std::size_t r = 0; r < found.edges.size(); ++r) {
       choice_.step_error.push_back(found.steps[r].at(finer));
       choice_.edge_error.push_back(found.edges[r].at(best.edges[r] / (4.0 * base.edges[r])));
-      choice_.error.push_back(std::max(rounding_error, together(choice_.edge_error[r], choice_.step_error[r], found.correlation[r])));
+      choice_.error.push_back(
+          std::max(rounding_error, together(choice_.edge_error[r], choice_.step_error[r], found.correlation[r])));
     }
     const double work = total(best.edges) * double(runs_.at(withSteps(base, 4)).steps) * finer;
     choice_.sayEdges(scene_, accuracy_);
     choice_.say("accuracy: " +
                 (adapts_ ? "dt_rtol " + shortText(choice_.loop.dt_rtol) + ", dt_atol " + shortText(choice_.loop.dt_atol)
                          : "dt " + shortText(choice_.loop.dt) + " (" + std::to_string(best.steps) + " steps)") +
-                "; " + std::to_string(probes_) + " runs to find out took " + shortText(seconds_) + " s, " + shortText(work_ / work) +
-                " times the edges x steps of the run");
+                "; " + std::to_string(probes_) + " runs to find out took " + shortText(seconds_) + " s, " +
+                shortText(work_ / work) + " times the edges x steps of the run");
   }
 };
 
 } // namespace
 
-PetscErrorCode chooseEdgesAndSteps(const Scene &scene, const std::vector<Drawing> &drawings, const LoopSettings &settings, const Accuracy &accuracy,
-                                   Choice *choice) {
+PetscErrorCode chooseEdgesAndSteps(const Scene &scene, const std::vector<Drawing> &drawings,
+                                   const LoopSettings &settings, const Accuracy &accuracy, Choice *choice) {
   PetscFunctionBeginUser;
   PetscCall(Chooser(scene, drawings, settings, accuracy, *choice).choose());
   PetscFunctionReturn(0);

@@ -12,7 +12,8 @@ namespace {
 
 /// Above this part of the largest displacement, a difference is not an error of discretisation.
 constexpr double most_difference = 0.3;
-/// Differences below this part of the length tell nothing about branches, whatever the displacement: Newton's tolerance may leave as much.
+/// Differences below this part of the length tell nothing about branches, whatever the displacement: Newton's tolerance
+/// may leave as much.
 constexpr double least_difference = 1e-6;
 
 template <class... Parts> std::string text(const Parts &...parts) {
@@ -37,7 +38,13 @@ double lengthOf(const Rod &rod) {
 }
 
 Answer answerOf(const Simulation &run, double rounding_error, std::vector<double> critical) {
-  return {true, "", run.state.time, run.state.position, energyBudget(run.scene, *run.elements, run.state, run.state.time), std::move(critical), rounding_error};
+  return {true,
+          "",
+          run.state.time,
+          run.state.position,
+          energyBudget(run.scene, *run.elements, run.state, run.state.time),
+          std::move(critical),
+          rounding_error};
 }
 
 PetscErrorCode solveStatics(Simulation &run, Scene scene, const LoopSettings &settings, Answer *answer) {
@@ -65,7 +72,8 @@ PetscErrorCode solveStatics(Simulation &run, Scene scene, const LoopSettings &se
 }
 
 /// One step without a load step, from the answer of `run` on its edges cut in two.
-static PetscErrorCode solveFrom(const Simulation &run, const Scene &scene, const LoopSettings &settings, Answer *answer) {
+static PetscErrorCode solveFrom(const Simulation &run, const Scene &scene, const LoopSettings &settings,
+                                Answer *answer) {
   Simulation fine;
   NewtonReport report;
   PetscFunctionBeginUser;
@@ -80,8 +88,8 @@ static PetscErrorCode solveFrom(const Simulation &run, const Scene &scene, const
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode estimateError(const Simulation &run, double rounding_error, const std::vector<double> &critical, const Scene &scene,
-                             const LoopSettings &settings, Estimate *estimate) {
+PetscErrorCode estimateError(const Simulation &run, double rounding_error, const std::vector<double> &critical,
+                             const Scene &scene, const LoopSettings &settings, Estimate *estimate) {
   PetscFunctionBeginUser;
   const Answer coarse = answerOf(run, rounding_error, critical);
   Answer fine;
@@ -101,7 +109,8 @@ PetscErrorCode estimateError(const Simulation &run, double rounding_error, const
   }
   if (!estimate->none.empty()) *estimate = richardson(run.scene, coarse, fine);
   if (fine.critical.size() != critical.size())
-    estimate->no_critical = text(critical.size(), " were found, ", fine.critical.size(), " with half the edges' lengths");
+    estimate->no_critical =
+        text(critical.size(), " were found, ", fine.critical.size(), " with half the edges' lengths");
   else
     for (std::size_t k = 0; k < critical.size(); ++k) {
       estimate->critical.push_back(fine.critical[k] + (fine.critical[k] - critical[k]) / 3);
@@ -111,7 +120,9 @@ PetscErrorCode estimateError(const Simulation &run, double rounding_error, const
 }
 
 int Estimate::worstRod() const {
-  return int(std::max_element(rods.begin(), rods.end(), [](const RodEstimate &a, const RodEstimate &b) { return a.error / a.length < b.error / b.length; }) -
+  return int(std::max_element(
+                 rods.begin(), rods.end(),
+                 [](const RodEstimate &a, const RodEstimate &b) { return a.error / a.length < b.error / b.length; }) -
              rods.begin());
 }
 
@@ -134,16 +145,18 @@ Estimate richardson(const Scene &scene, const Answer &coarse, const Answer &fine
       r.tip = error;
     }
     if (out.none.empty() && r.error > std::max(most_difference * r.displacement, least_difference * r.length))
-      out.none = text("rod '", rod.name, "' differs between ", rod.edges(), " and ", 2 * rod.edges(), " edges by ", r.error * 3 / 4,
-                      " m where its largest displacement is ", r.displacement,
+      out.none = text("rod '", rod.name, "' differs between ", rod.edges(), " and ", 2 * rod.edges(), " edges by ",
+                      r.error * 3 / 4, " m where its largest displacement is ", r.displacement,
                       " m: the two answers are on different branches of equilibria, or the edges are too long");
     first += rod.vertices();
     fine_first += rod.vertices() + rod.edges();
   }
   if (coarse.load_factor != fine.load_factor)
-    out.none = text("the two answers end at different load factors, ", exactly(coarse.load_factor), " and ", exactly(fine.load_factor));
+    out.none = text("the two answers end at different load factors, ", exactly(coarse.load_factor), " and ",
+                    exactly(fine.load_factor));
   out.energy = coarse.energy;
-  for (const auto &[name, member] : estimated_energies) out.energy_error.*member = (coarse.energy.*member - fine.energy.*member) * 4 / 3;
+  for (const auto &[name, member] : estimated_energies)
+    out.energy_error.*member = (coarse.energy.*member - fine.energy.*member) * 4 / 3;
   return out;
 }
 
@@ -151,20 +164,22 @@ std::vector<std::string> describe(const Estimate &e, const Scene &scene) {
   std::vector<std::string> lines;
   if (e.none.empty()) {
     const RodEstimate &worst = e.rods[e.worstRod()];
-    lines.push_back(text("estimated error: position ", worst.error, " m, ", worst.error / worst.length, " of the length of rod '",
-                         scene.rods[e.worstRod()].name, "' (vertex ", worst.vertex, ")"));
+    lines.push_back(text("estimated error: position ", worst.error, " m, ", worst.error / worst.length,
+                         " of the length of rod '", scene.rods[e.worstRod()].name, "' (vertex ", worst.vertex, ")"));
     std::string line;
     for (const auto &[name, member] : estimated_energies)
       if (e.energy.*member != 0)
-        line += (line.empty() ? "" : ", ") + text(name, " energy ", std::abs(e.energy_error.*member), " of ") + exactly(e.energy.*member) + " J";
+        line += (line.empty() ? "" : ", ") + text(name, " energy ", std::abs(e.energy_error.*member), " of ") +
+                exactly(e.energy.*member) + " J";
     if (!line.empty()) lines.push_back("estimated error: " + line);
     if (e.tan)
-      lines.push_back(
-          "measure tan: the estimate holds, but its series has more terms than that of measure angle, with which the extrapolated positions are closer");
+      lines.push_back("measure tan: the estimate holds, but its series has more terms than that of measure angle, with "
+                      "which the extrapolated positions are closer");
   } else
     lines.push_back("no estimate: " + e.none);
   for (std::size_t k = 0; k < e.critical.size(); ++k)
-    lines.push_back(text("estimated error: critical load factor ", e.critical_error[k], ", extrapolated ") + exactly(e.critical[k]));
+    lines.push_back(text("estimated error: critical load factor ", e.critical_error[k], ", extrapolated ") +
+                    exactly(e.critical[k]));
   if (!e.no_critical.empty()) lines.push_back("no estimate of critical load factors: " + e.no_critical);
   return lines;
 }

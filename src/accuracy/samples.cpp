@@ -35,7 +35,8 @@ PetscErrorCode sample(Scene scene, const LoopSettings &settings, const std::vect
   PetscFunctionReturn(0);
 }
 
-std::vector<Errors> difference(const Scene &scene, const Samples &run, const Samples &other, const std::vector<int> &edges, Quantity of) {
+std::vector<Errors> difference(const Scene &scene, const Samples &run, const Samples &other,
+                               const std::vector<int> &edges, Quantity of) {
   const std::size_t times = run.position.size();
   if (of == Quantity::energy) {
     const double largest = std::max(*std::max_element(other.elastic.begin(), other.elastic.end()), 1e-300);
@@ -52,7 +53,8 @@ std::vector<Errors> difference(const Scene &scene, const Samples &run, const Sam
     for (std::size_t v = of == Quantity::tip ? vertices - 1 : 0; v < vertices; ++v) {
       std::vector<Vec3> &series = out[r].emplace_back();
       for (std::size_t k = 0; k < times; ++k)
-        series.push_back((run.position[k][first + ratio * v] - other.position[k][other_first + other_ratio * v]) / length);
+        series.push_back((run.position[k][first + ratio * v] - other.position[k][other_first + other_ratio * v]) /
+                         length);
     }
     first += run.edges[r] + ends;
     other_first += other.edges[r] + ends;
@@ -62,7 +64,9 @@ std::vector<Errors> difference(const Scene &scene, const Samples &run, const Sam
 
 /// Mean in time.
 static double product(const std::vector<Vec3> &a, const std::vector<Vec3> &b) {
-  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0, std::plus<>(), [](const Vec3 &x, const Vec3 &y) { return x.dot(y); }) / double(a.size());
+  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0, std::plus<>(),
+                            [](const Vec3 &x, const Vec3 &y) { return x.dot(y); }) /
+         double(a.size());
 }
 
 double sizeOf(const Errors &errors) {
@@ -76,7 +80,8 @@ double correlation(const Errors &a, const Errors &b) {
   double most = 0;
   for (std::size_t v = 0; v < a.size(); ++v) {
     const double here_a = std::sqrt(product(a[v], a[v])), here_b = std::sqrt(product(b[v], b[v]));
-    if (here_a > 0.5 * size_a || here_b > 0.5 * size_b) most = std::max(most, product(a[v], b[v]) / std::max(here_a * here_b, 1e-300));
+    if (here_a > 0.5 * size_a || here_b > 0.5 * size_b)
+      most = std::max(most, product(a[v], b[v]) / std::max(here_a * here_b, 1e-300));
   }
   return std::min(most, 1.0);
 }

@@ -8,54 +8,64 @@
 
 namespace tendril {
 
-constexpr const char *cannot_factor = "the Hessian cannot be factored; take more -load_steps, or look for rods that nothing holds";
-constexpr const char *vanishing_edge = "an edge vanishes or turns back on itself; use more edges, or a larger axial_stiffness";
+constexpr const char *cannot_factor =
+    "the Hessian cannot be factored; take more -load_steps, or look for rods that nothing holds";
+constexpr const char *vanishing_edge =
+    "an edge vanishes or turns back on itself; use more edges, or a larger axial_stiffness";
 
 void requireDeadLoads(const Scene &scene) {
   for (const Support &support : scene.supports)
     if (support.motion.moves())
-      throw SceneError("the support of rod '" + scene.rods[support.rod].name + "' at vertex " + std::to_string(support.vertex) +
-                       " moves: -continuation arclength scales dead loads only; hold the support still or use -continuation load");
-  const bool weight = !scene.gravity.isZero(0) && std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &rod) { return rod.gravity; });
+      throw SceneError(
+          "the support of rod '" + scene.rods[support.rod].name + "' at vertex " + std::to_string(support.vertex) +
+          " moves: -continuation arclength scales dead loads only; hold the support still or use -continuation load");
+  const bool weight = !scene.gravity.isZero(0) &&
+                      std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &rod) { return rod.gravity; });
   if (!weight && scene.rotation.angular_velocity.isZero(0) && scene.forces.empty() && scene.moments.empty())
     throw SceneError("-continuation arclength needs a load to follow: gravity, a force, a torque or a moment");
 }
 
 ArcLength::ArcLength(StepSolver &solver, const LoopSettings &settings)
-    : solver_(solver), settings_(settings), metric_(solver.potential().dofs().makePlanes()), load_derivatives_(solver.potential().dofs().slots()) {
+    : solver_(solver), settings_(settings), metric_(solver.potential().dofs().makePlanes()),
+      load_derivatives_(solver.potential().dofs().slots()) {
   const IncrementalPotential &potential = solver.potential();
   const Elements &e = potential.elements();
   load_ = makeLoad(potential.scene(), e);
   for (const RodRange &rod : e.rods) {
     double length = 0;
     for (int s = rod.first_slot; s < rod.edgeEnd(); ++s) length += e.restLength()[s];
-    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) metric_.setVector(0, s, Vec3::Constant(1 / (length * length * e.vertices())));
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
+      metric_.setVector(0, s, Vec3::Constant(1 / (length * length * e.vertices())));
     if (rod.twist) std::fill(metric_[3] + rod.first_slot, metric_[3] + rod.edgeEnd(), 1.0 / e.edges());
   }
 }
 
 double ArcLength::product(const Point &a, const Point &b) const {
   double sum = a.factor * b.factor;
-  for (std::size_t k = 0; k < metric_.size(); ++k) sum += metric_.data()[k] * a.unknowns.data()[k] * b.unknowns.data()[k];
+  for (std::size_t k = 0; k < metric_.size(); ++k)
+    sum += metric_.data()[k] * a.unknowns.data()[k] * b.unknowns.data()[k];
   return sum;
 }
 
 /// Of the positions and twists alone.
 double ArcLength::size(const Point &p) const { return std::sqrt(std::max(0.0, product(p, p) - p.factor * p.factor)); }
 
-/// The largest correction that is little: against what a step, or its load, moves, or against the rounding of the coordinates.
+/// The largest correction that is little: against what a step, or its load, moves, or against the rounding of the
+/// coordinates.
 double ArcLength::allowance(const Point &moved) const {
   const double by_load = std::min(1.0, load_reach_ * std::abs(solver_.potential().step().load_factor));
   return std::max(solver_.potential().settings.rounding_tolerance * std::max(size(moved), by_load), rounding_);
 }
 
-/// At the end of a step, with its Hessian factored and the tangent there: whether what Newton would still move it by, across the path, is little.
+/// At the end of a step, with its Hessian factored and the tangent there: whether what Newton would still move it by,
+/// across the path, is little.
 PetscErrorCode ArcLength::verify(const Point &direction, bool *little) {
   PetscFunctionBeginUser;
   Point rest;
   PetscCall(solve(solver_.potential().derivatives().gradient, &rest.unknowns));
   const double along = product(direction, rest);
-  for (std::size_t k = 0; k < rest.unknowns.size(); ++k) rest.unknowns.data()[k] -= along * direction.unknowns.data()[k];
+  for (std::size_t k = 0; k < rest.unknowns.size(); ++k)
+    rest.unknowns.data()[k] -= along * direction.unknowns.data()[k];
   rest.factor -= along * direction.factor;
   left_ = size(rest);
   *little = left_ <= allowance(last_);
@@ -112,7 +122,8 @@ PetscErrorCode ArcLength::tangent(Point *direction) {
   if (negative_ < 0) obstacle_ = cannot_factor;
   direction->factor = 1;
   PetscCall(solveLoad(&direction->unknowns));
-  const double side = last_.unknowns.size() == 0 ? 1 : product(*direction, last_), norm = std::sqrt(product(*direction, *direction));
+  const double side = last_.unknowns.size() == 0 ? 1 : product(*direction, last_),
+               norm = std::sqrt(product(*direction, *direction));
   const double scale = (side < 0 ? -1 : 1) / norm;
   for (double &d : direction->unknowns) d *= scale;
   direction->factor *= scale;
@@ -136,10 +147,11 @@ std::string ArcLength::imbalance() {
   return tellImbalance(potential, farthestRod(potential, potential.all(), asked), asked);
 }
 
-/// Newton on equilibrium and one constraint: two solves per factorisation, one for the residual and one for the load. The constraint gives the
-/// change of the load factor from the way made so far and the two solutions.
-PetscErrorCode ArcLength::iterate(const std::function<double(const Point &moved, const Point &residual, const Point &load)> &constraint, double start,
-                                  bool *converged) {
+/// Newton on equilibrium and one constraint: two solves per factorisation, one for the residual and one for the load.
+/// The constraint gives the change of the load factor from the way made so far and the two solutions.
+PetscErrorCode ArcLength::iterate(
+    const std::function<double(const Point &moved, const Point &residual, const Point &load)> &constraint, double start,
+    bool *converged) {
   constexpr int most_iterations = 15;
   PetscFunctionBeginUser;
   IncrementalPotential &potential = solver_.potential();
@@ -187,16 +199,19 @@ PetscErrorCode ArcLength::iterate(const std::function<double(const Point &moved,
 /// From the predicted point to the path, in the plane normal to the tangent at the start of the step.
 PetscErrorCode ArcLength::correct(double start, const Point &direction, double length, bool *converged) {
   PetscFunctionBeginUser;
-  PetscCall(iterate([&](const Point &moved, const Point &residual,
-                        const Point &load) { return (length - product(direction, moved) - product(direction, residual)) / product(direction, load); },
-                    start, converged));
+  PetscCall(iterate(
+      [&](const Point &moved, const Point &residual, const Point &load) {
+        return (length - product(direction, moved) - product(direction, residual)) / product(direction, load);
+      },
+      start, converged));
   PetscFunctionReturn(0);
 }
 
 /// To the point of the path nearby that has a given load factor.
 PetscErrorCode ArcLength::correctAt(double factor, bool *converged) {
   PetscFunctionBeginUser;
-  PetscCall(iterate([&](const Point &moved, const Point &, const Point &) { return factor - moved.factor; }, 0, converged));
+  PetscCall(
+      iterate([&](const Point &moved, const Point &, const Point &) { return factor - moved.factor; }, 0, converged));
   if (*converged) solver_.potential().setLoadFactor(factor);
   PetscFunctionReturn(0);
 }
@@ -212,7 +227,8 @@ PetscErrorCode ArcLength::begin(const State &state, Point *direction) {
   PetscFunctionReturn(0);
 }
 
-/// Motions at the iterate that cost next to nothing: of stiffness below `little` of the softest bending, of either sign.
+/// Motions at the iterate that cost next to nothing: of stiffness below `little` of the softest bending, of either
+/// sign.
 PetscErrorCode ArcLength::countNeutral(double little, int *count) {
   PetscFunctionBeginUser;
   int low, high;
@@ -222,8 +238,9 @@ PetscErrorCode ArcLength::countNeutral(double little, int *count) {
   PetscFunctionReturn(0);
 }
 
-/// Where a motion costs nothing, solves the start of a step and its tangent again, and what follows, to a sharper tolerance: a turn about an axis that costs
-/// nothing in equilibrium has a stiffness of the residual, which may be larger than what holds it and of the other sign. Then steps go along it.
+/// Where a motion costs nothing, solves the start of a step and its tangent again, and what follows, to a sharper
+/// tolerance: a turn about an axis that costs nothing in equilibrium has a stiffness of the residual, which may be
+/// larger than what holds it and of the other sign. Then steps go along it.
 PetscErrorCode ArcLength::refine(State &state, Point *direction, bool *refined) {
   constexpr double little = 1e-4; // of the softest bending
   PetscFunctionBeginUser;
@@ -242,7 +259,8 @@ PetscErrorCode ArcLength::refine(State &state, Point *direction, bool *refined) 
   PetscFunctionReturn(0);
 }
 
-/// Says so where the loads move what costs nothing at the start of the path: a rod that hangs from one pin has no position without them.
+/// Says so where the loads move what costs nothing at the start of the path: a rod that hangs from one pin has no
+/// position without them.
 PetscErrorCode ArcLength::refuseFreeStart(const State &state) {
   constexpr double little = 1e-5; // of the softest bending
   PetscFunctionBeginUser;
@@ -252,7 +270,8 @@ PetscErrorCode ArcLength::refuseFreeStart(const State &state) {
   PetscCall(countNeutral(little, &neutral));
   if (neutral <= 0) PetscFunctionReturn(0);
   std::ostringstream message;
-  message << "the path cannot start at load factor " << state.time << ": without loads a rod is free to move, as one that hangs from one pin is; hold it by a "
+  message << "the path cannot start at load factor " << state.time
+          << ": without loads a rod is free to move, as one that hangs from one pin is; hold it by a "
              "clamp or a second pin, or use -continuation load";
   failure_ = message.str();
   PetscFunctionReturn(0);
@@ -260,7 +279,8 @@ PetscErrorCode ArcLength::refuseFreeStart(const State &state) {
 
 /// One step along the path, or `along` another direction; the potential's iterate is its end when it converged.
 PetscErrorCode ArcLength::step(const State &state, double length, bool *converged, const Point *along) {
-  constexpr double straying = 1.5; // of the step's length, from tangent to chord below 48 degrees: beyond it may be another branch
+  constexpr double straying =
+      1.5; // of the step's length, from tangent to chord below 48 degrees: beyond it may be another branch
   PetscFunctionBeginUser;
   *converged = false;
   iterations_ = 0;
@@ -283,7 +303,9 @@ PetscErrorCode ArcLength::step(const State &state, double length, bool *converge
   Point moved;
   potential.coordinates(moved.unknowns);
   moved.factor = potential.step().load_factor - state.time;
-  const double way = along ? size(moved) : std::sqrt(product(moved, moved)); // the load may rise as steeply as it will on a branch that leaves
+  const double way =
+      along ? size(moved)
+            : std::sqrt(product(moved, moved)); // the load may rise as steeply as it will on a branch that leaves
   *converged = way < straying * length;
   if (*converged) last_ = moved;
   astray_ = !*converged;
@@ -291,10 +313,10 @@ PetscErrorCode ArcLength::step(const State &state, double length, bool *converge
   PetscFunctionReturn(0);
 }
 
-/// The point between the ends of a step where the load factor turns: false position (Illinois) on the slope of the load factor along the path,
-/// by steps of other lengths from the same start.
-PetscErrorCode ArcLength::locateLimit(const State &start, const Point &before, const std::array<double, 2> &slopes, double length,
-                                      std::vector<CriticalPoint> *located) {
+/// The point between the ends of a step where the load factor turns: false position (Illinois) on the slope of the load
+/// factor along the path, by steps of other lengths from the same start.
+PetscErrorCode ArcLength::locateLimit(const State &start, const Point &before, const std::array<double, 2> &slopes,
+                                      double length, std::vector<CriticalPoint> *located) {
   constexpr int most_steps = 20;
   constexpr double flat = 1e-4; // of the slope at the start: the load factor is off by its square
   PetscFunctionBeginUser;
@@ -332,8 +354,10 @@ PetscErrorCode ArcLength::locateLimit(const State &start, const Point &before, c
   PetscFunctionReturn(0);
 }
 
-/// The points between the ends of a step where the count of unstable motions changes while the load factor does not turn.
-PetscErrorCode ArcLength::locateBifurcation(const State &start, const State &end, const Point &before, double length, std::vector<CriticalPoint> *located) {
+/// The points between the ends of a step where the count of unstable motions changes while the load factor does not
+/// turn.
+PetscErrorCode ArcLength::locateBifurcation(const State &start, const State &end, const Point &before, double length,
+                                            std::vector<CriticalPoint> *located) {
   constexpr double no_load = 1e-4; // of the step
   PetscFunctionBeginUser;
   const Point after = std::exchange(last_, before);
@@ -366,7 +390,8 @@ PetscErrorCode ArcLength::locateBifurcation(const State &start, const State &end
     low = point.beyond;
     point.state->step = start.step;
     point.limit = false;
-    // Where the load passes zero, what may turn about an axis costs nothing and becomes unstable, or stable: that is no critical load.
+    // Where the load passes zero, what may turn about an axis costs nothing and becomes unstable, or stable: that is no
+    // critical load.
     if (std::abs(point.load_factor) >= no_load * std::abs(start.time - end.time)) located->push_back(std::move(point));
   }
   last_ = after;
@@ -375,8 +400,10 @@ PetscErrorCode ArcLength::locateBifurcation(const State &start, const State &end
   PetscFunctionReturn(0);
 }
 
-/// A step from a critical point along its mode, onto the branch that leaves there (Keller 1977): Newton for equilibrium and the plane normal to the mode.
-PetscErrorCode ArcLength::switchBranch(const CriticalPoint &critical, double length, double shortest, State *state, bool *switched) {
+/// A step from a critical point along its mode, onto the branch that leaves there (Keller 1977): Newton for equilibrium
+/// and the plane normal to the mode.
+PetscErrorCode ArcLength::switchBranch(const CriticalPoint &critical, double length, double shortest, State *state,
+                                       bool *switched) {
   constexpr double least = 1e-3; // what cannot get shorter hardly bends while the load rises a lot
   PetscFunctionBeginUser;
   Step here;
@@ -392,7 +419,8 @@ PetscErrorCode ArcLength::switchBranch(const CriticalPoint &critical, double len
   }
   const double norm = size(mode);
   for (double &d : mode.unknowns) d /= norm;
-  for (; !*switched && length >= least * shortest; length *= 0.5) PetscCall(step(*critical.state, length, switched, &mode));
+  for (; !*switched && length >= least * shortest; length *= 0.5)
+    PetscCall(step(*critical.state, length, switched, &mode));
   if (!*switched) PetscFunctionReturn(0);
   *state = *critical.state;
   solver_.potential().commit(*state);
@@ -417,14 +445,17 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
   PetscCall(tangent(&direction));
   rounding_ = 0;
   for (int r = 0; r < potential.all().end; ++r)
-    rounding_ = std::max(rounding_,
-                         4 * std::numeric_limits<double>::epsilon() * std::max(1.0, potential.rodEnergy(potential.iterate(), r).reach / potential.length(r)));
+    rounding_ =
+        std::max(rounding_, 4 * std::numeric_limits<double>::epsilon() *
+                                std::max(1.0, potential.rodEnergy(potential.iterate(), r).reach / potential.length(r)));
   load_reach_ = size(direction) / std::abs(direction.factor);
   const double first = settings_.dt / direction.factor; // as long as a load step of dt
   const double shortest = first * (settings_.dt_min > 0 ? settings_.dt_min / settings_.dt : 1.0 / 1024);
   double length = first;
   int rejected = 0, in_vain = 0; // steps since the last one accepted, and their iterations
-  auto energyOf = [&](const State &at) { return energyBudget(potential.scene(), potential.elements(), at, potential.iterate(), at.time); };
+  auto energyOf = [&](const State &at) {
+    return energyBudget(potential.scene(), potential.elements(), at, potential.iterate(), at.time);
+  };
   EnergyBudget before = energyOf(state);
   for (int taken = 0; taken < settings_.arclength_steps && state.time < settings_.t_end;) {
     const State start = state;
@@ -441,8 +472,8 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     if (converged) {
       const int negative = negative_;
       PetscCall(tangent(&end));
-      // At a limit point an odd number of pivots and the slope change sign together. Pivots alone: a bifurcation, or a turn so sharp that the
-      // tangent behind it was taken for the reverse of the tangent before. Short steps tell.
+      // At a limit point an odd number of pivots and the slope change sign together. Pivots alone: a bifurcation, or a
+      // turn so sharp that the tangent behind it was taken for the reverse of the tangent before. Short steps tell.
       crossed = negative != negative_;
       const bool odd = (negative - negative_) % 2 != 0, turns = slope * end.factor < 0;
       const bool doubtful = odd != turns && potential.scene().moments.empty() && length > first / 16;
@@ -462,8 +493,10 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     }
     if (!little) {
       std::ostringstream message;
-      message << "step along the path at load factor " << state.time << " is lost in rounding: Newton would still move it by " << left_
-              << " of the length, it moves " << size(last_) << " (-rounding_tolerance " << potential.settings.rounding_tolerance << "); use fewer edges" << imbalance();
+      message << "step along the path at load factor " << state.time
+              << " is lost in rounding: Newton would still move it by " << left_ << " of the length, it moves "
+              << size(last_) << " (-rounding_tolerance " << potential.settings.rounding_tolerance
+              << "); use fewer edges" << imbalance();
       failure_ = message.str();
       PetscFunctionReturn(0);
     }
@@ -484,15 +517,17 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
       if (taken == 0) PetscCall(refuseFreeStart(state));
       if (!failure_.empty()) PetscFunctionReturn(0);
       std::ostringstream message;
-      message << "step along the path at load factor " << state.time << " failed with length " << 2 * length << " after " << iterations_
-              << (iterations_ == 1 ? " iteration: " : " iterations: ") << obstacle_ << out_of_balance;
+      message << "step along the path at load factor " << state.time << " failed with length " << 2 * length
+              << " after " << iterations_ << (iterations_ == 1 ? " iteration: " : " iterations: ") << obstacle_
+              << out_of_balance;
       failure_ = message.str();
       PetscFunctionReturn(0);
     }
     std::swap(direction, end);
     potential.commit(state);
     EnergyBudget energy = energyOf(state);
-    Work work = staticWork(potential.scene(), potential.elements(), start, state, potential.start(), potential.iterate());
+    Work work =
+        staticWork(potential.scene(), potential.elements(), start, state, potential.start(), potential.iterate());
     ++taken;
     std::vector<CriticalPoint> critical;
     const bool locates = settings_.bifurcation != Bifurcation::off;
@@ -500,7 +535,8 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
       PetscCall(locateLimit(start, before_step, {slope, direction.factor}, length, &critical));
     else if (locates && crossed && potential.scene().moments.empty())
       PetscCall(locateBifurcation(start, state, before_step, length, &critical));
-    if (settings_.bifurcation != Bifurcation::locate && critical.size() > 1) critical.resize(1); // the run goes no further this way
+    if (settings_.bifurcation != Bifurcation::locate && critical.size() > 1)
+      critical.resize(1); // the run goes no further this way
     for (const CriticalPoint &point : critical)
       if (on_critical) PetscCall(on_critical(point));
     if (!critical.empty() && settings_.bifurcation == Bifurcation::stop) {
@@ -513,7 +549,8 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
       PetscCall(switchBranch(critical.front(), length, shortest, &state, &switched));
       if (!switched) {
         std::ostringstream message;
-        message << "no branch was found along the critical mode at load factor " << critical.front().load_factor << ": " << obstacle_;
+        message << "no branch was found along the critical mode at load factor " << critical.front().load_factor << ": "
+                << obstacle_;
         failure_ = message.str();
         state = *critical.front().state;
         PetscFunctionReturn(0);
@@ -538,7 +575,8 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     row.wall_seconds = now - begin;
     PetscCall(observe(state, row));
     if (stops && state.time < settings_.t_end && stops()) PetscFunctionReturn(0);
-    length = std::clamp(length * std::clamp(std::sqrt(wanted_iterations / std::max(iterations_, 1)), 0.5, 2.0), shortest, most_growth * first);
+    length = std::clamp(length * std::clamp(std::sqrt(wanted_iterations / std::max(iterations_, 1)), 0.5, 2.0),
+                        shortest, most_growth * first);
   }
   *finished = true;
   PetscFunctionReturn(0);

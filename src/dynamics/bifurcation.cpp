@@ -40,7 +40,8 @@ void SharpTolerance::set(PetscReal rtol) {
   }
 }
 
-constexpr double neutral = 1e-8; // of the softest bending: above what Newton and rounding leave of a motion that costs nothing
+constexpr double neutral =
+    1e-8; // of the softest bending: above what Newton and rounding leave of a motion that costs nothing
 
 PetscErrorCode countUnstable(StepSolver &solver, int *unstable) {
   PetscFunctionBeginUser;
@@ -54,16 +55,19 @@ static void goTo(StepSolver &solver, const State &state, Step step) {
   solver.begin(state, step);
 }
 
-/// Whether a motion loses its stiffness towards a critical point: at `there`, which is much nearer to it than `before`, the softest one that is stable has a
-/// small `part` of what it has at `before`. Where Newton only fails, or jumps, or where a motion costs nothing, none does.
-static PetscErrorCode softens(StepSolver &solver, const Step &step, const BranchPoint &before, const BranchPoint &there, double part, bool *softer) {
+/// Whether a motion loses its stiffness towards a critical point: at `there`, which is much nearer to it than `before`,
+/// the softest one that is stable has a small `part` of what it has at `before`. Where Newton only fails, or jumps, or
+/// where a motion costs nothing, none does.
+static PetscErrorCode softens(StepSolver &solver, const Step &step, const BranchPoint &before, const BranchPoint &there,
+                              double part, bool *softer) {
   constexpr double first = 1e-7, grows = 4, highest = 1e12; // of the softest bending
   PetscFunctionBeginUser;
   int softest, count; // motions that cost nothing are counted in both
   double stiffness = first;
   goTo(solver, before.state, step);
   PetscCall(solver.inertiaAtIterate(&softest, -stiffness));
-  for (count = softest; count == softest && stiffness < highest;) PetscCall(solver.inertiaAtIterate(&count, -(stiffness *= grows)));
+  for (count = softest; count == softest && stiffness < highest;)
+    PetscCall(solver.inertiaAtIterate(&count, -(stiffness *= grows)));
   goTo(solver, there.state, step);
   PetscCall(solver.inertiaAtIterate(&count, -part * stiffness));
   *softer = count > softest;
@@ -79,13 +83,16 @@ PetscErrorCode criticalMode(StepSolver &solver, const CriticalPoint &point, Step
   PetscFunctionReturn(0);
 }
 
-/// Whether two points may be of one branch: before a limit point a rod moves by the root of the interval; beyond it, Newton jumps.
+/// Whether two points may be of one branch: before a limit point a rod moves by the root of the interval; beyond it,
+/// Newton jumps.
 static bool areNear(const BranchPoint &a, const BranchPoint &b, double width) {
   return distanceBetween(a.state, b.state) <= std::sqrt(std::abs(a.parameter - b.parameter) / width);
 }
 
-/// Bisection. Steps begin at `base`, the last point that is not within `aside` of the critical one, where the Hessian is nearly singular and Newton strays.
-static PetscErrorCode bisect(const Follow &follow, BranchPoint *low, BranchPoint *base, double high, double interval, double aside, double width) {
+/// Bisection. Steps begin at `base`, the last point that is not within `aside` of the critical one, where the Hessian
+/// is nearly singular and Newton strays.
+static PetscErrorCode bisect(const Follow &follow, BranchPoint *low, BranchPoint *base, double high, double interval,
+                             double aside, double width) {
   PetscFunctionBeginUser;
   *base = *low;
   while (high - low->parameter > interval) {
@@ -94,7 +101,8 @@ static PetscErrorCode bisect(const Follow &follow, BranchPoint *low, BranchPoint
     BranchPoint point;
     PetscCall(follow(*base, middle, &point));
     auto goesOn = [&] { return point.found && areNear(*low, point, width); };
-    if (!goesOn() && base->parameter != low->parameter) PetscCall(follow(*low, middle, &point)); // towards a limit point, the nearest start is best
+    if (!goesOn() && base->parameter != low->parameter)
+      PetscCall(follow(*low, middle, &point)); // towards a limit point, the nearest start is best
     // What cannot be found counts as beyond: past a limit point there is nothing near to converge to.
     if (goesOn() && point.unstable == low->unstable) {
       *low = point;
@@ -105,9 +113,11 @@ static PetscErrorCode bisect(const Follow &follow, BranchPoint *low, BranchPoint
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode locateCritical(StepSolver &solver, const Step &step, const Follow &follow, BranchPoint low, double high, double scale, CriticalPoint *point, bool *found) {
+PetscErrorCode locateCritical(StepSolver &solver, const Step &step, const Follow &follow, BranchPoint low, double high,
+                              double scale, CriticalPoint *point, bool *found) {
   constexpr int most_rounds = 12;
-  constexpr double interval = 1e-9, agreement = 1e-7, part = 1e-3; // of the scale, of the load factor, of the first interval
+  constexpr double interval = 1e-9, agreement = 1e-7,
+                   part = 1e-3; // of the scale, of the load factor, of the first interval
   PetscFunctionBeginUser;
   *found = false;
   const Doing here([](std::ostream &out) { out << "a critical load is searched for"; });
@@ -126,7 +136,9 @@ PetscErrorCode locateCritical(StepSolver &solver, const Step &step, const Follow
     };
     PetscCall(bisect(follow, &low, &base, high, interval * scale, aside, width));
     if (std::abs(low.state.time - last) <= agreement * std::abs(last)) {
-      if (low.parameter > start) PetscCall(softens(solver, step, before, low, 3 * std::sqrt(interval * scale / aside), found)); // the root is that of limit points
+      if (low.parameter > start)
+        PetscCall(softens(solver, step, before, low, 3 * std::sqrt(interval * scale / aside),
+                          found)); // the root is that of limit points
       if (!*found && !ahead) break;
       if (!*found) {
         PetscCall(goOn());
@@ -146,7 +158,8 @@ PetscErrorCode locateCritical(StepSolver &solver, const Step &step, const Follow
     if (!before.found || before.unstable != low.unstable) break; // no branch that leads here
     const double behind = std::min(low.parameter + aside, end);
     PetscCall(follow(before, behind, &beyond));
-    if (beyond.found && beyond.unstable == low.unstable) { // the step had gone over to another branch: on along this one
+    if (beyond.found &&
+        beyond.unstable == low.unstable) { // the step had gone over to another branch: on along this one
       if (behind == end) break;
       PetscCall(goOn());
     } else {

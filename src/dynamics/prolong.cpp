@@ -40,15 +40,19 @@ void setTurns(const std::vector<TwistRates> &rates, const Scene &fine, const Ele
       const LooseCell &cell = cells[n];
       const int slot = cell.slot;
       const int j = edgeAt(elements.rods[r], cell.frame0), k = edgeAt(elements.rods[r], cell.frame1);
-      const double rate = j >= 0 ? (j % 2 == 0 ? middle(j / 2) : after[j / 2]) : k % 2 == 0 ? before[k / 2] : middle(k / 2);
-      state.turns[elements.rod_cells[r] + n] = 2 * pi * std::round((rate * elements.cellLength()[slot] - c[Configuration::twist][slot]) / (2 * pi));
+      const double rate = j >= 0       ? (j % 2 == 0 ? middle(j / 2) : after[j / 2])
+                          : k % 2 == 0 ? before[k / 2]
+                                       : middle(k / 2);
+      state.turns[elements.rod_cells[r] + n] =
+          2 * pi * std::round((rate * elements.cellLength()[slot] - c[Configuration::twist][slot]) / (2 * pi));
     }
   }
 }
 
 } // namespace
 
-State prolonged(const State &state, const Scene &scene, const Elements &elements, const Scene &fine, const Elements &fine_elements) {
+State prolonged(const State &state, const Scene &scene, const Elements &elements, const Scene &fine,
+                const Elements &fine_elements) {
   State out;
   out.time = state.time;
   out.step = state.step;
@@ -56,7 +60,9 @@ State prolonged(const State &state, const Scene &scene, const Elements &elements
   std::vector<TwistRates> rates;
   for (int r = 0; r < int(scene.rods.size()); ++r) {
     const RodRange &range = elements.rods[r];
-    rates.push_back(range.twist ? twistRates(elements, c, r) : TwistRates{std::vector<double>(range.edges, 0.0), std::vector<double>(range.edges, 0.0)});
+    rates.push_back(range.twist
+                        ? twistRates(elements, c, r)
+                        : TwistRates{std::vector<double>(range.edges, 0.0), std::vector<double>(range.edges, 0.0)});
     Rod present = scene.rods[r];
     std::copy_n(state.position.begin() + range.first_vertex, range.vertices, present.position.begin());
     const Curve curve = curveThrough(present);
@@ -67,14 +73,18 @@ State prolonged(const State &state, const Scene &scene, const Elements &elements
       const double a = halves.edge(2 * i).norm(), b = halves.edge(2 * i + 1).norm();
       return a / (a + b);
     };
-    for (int i = 0; i < halves.vertices(); ++i) present.position.push_back(curve((i / 2 + (i % 2 == 0 ? 0 : firstPart(i / 2))) / range.edges));
+    for (int i = 0; i < halves.vertices(); ++i)
+      present.position.push_back(curve((i / 2 + (i % 2 == 0 ? 0 : firstPart(i / 2))) / range.edges));
     out.position.insert(out.position.end(), present.position.begin(), present.position.end());
     for (int i = 0; i < range.edges; ++i) {
       const Frame f = c.frameAt(range.slot(i));
-      const double half = 0.5 * elements.restLength()[range.slot(i)], first = firstPart(i); // middles move by half the other part
-      for (const auto &[child, turn] : {std::pair(2 * i, (first - 1) * half * rates[r].before[i]), std::pair(2 * i + 1, first * half * rates[r].after[i])}) {
+      const double half = 0.5 * elements.restLength()[range.slot(i)],
+                   first = firstPart(i); // middles move by half the other part
+      for (const auto &[child, turn] : {std::pair(2 * i, (first - 1) * half * rates[r].before[i]),
+                                        std::pair(2 * i + 1, first * half * rates[r].after[i])}) {
         const Vec3 t = present.edge(child).normalized();
-        out.director.push_back(orthonormalised(rotateAbout<double>(transport<double>(f.director, f.tangent, t), t, turn), t));
+        out.director.push_back(
+            orthonormalised(rotateAbout<double>(transport<double>(f.director, f.tangent, t), t, turn), t));
         out.axial_force.push_back(state.axial_force[range.first_edge + i]);
       }
     }

@@ -10,7 +10,9 @@ PetscErrorCode Simulation::setUp(Scene scene_to_run, const LoopSettings &setting
   elements = std::make_unique<Elements>(scene, dofs);
   potential = std::make_unique<IncrementalPotential>(scene, dofs, *elements, settings.dynamic);
   potential->settings = settings.solve;
-  PetscCall(solver.setUp(*potential, !settings.dynamic && settings.continuation == Continuation::arclength ? Coupling::load : Coupling::none));
+  PetscCall(solver.setUp(*potential, !settings.dynamic && settings.continuation == Continuation::arclength
+                                         ? Coupling::load
+                                         : Coupling::none));
   state = initialState(scene, *elements);
   PetscFunctionReturn(0);
 }

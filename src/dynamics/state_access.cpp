@@ -13,7 +13,8 @@ int rodNamed(const Scene &scene, const std::string &name) {
   for (std::size_t r = 0; r < scene.rods.size(); ++r)
     if (scene.rods[r].name == name) return int(r);
   std::string names;
-  for (std::size_t r = 0; r < std::min<std::size_t>(scene.rods.size(), 8); ++r) names += (r > 0 ? ", '" : "'") + scene.rods[r].name + "'";
+  for (std::size_t r = 0; r < std::min<std::size_t>(scene.rods.size(), 8); ++r)
+    names += (r > 0 ? ", '" : "'") + scene.rods[r].name + "'";
   throw SceneError("no rod is called '" + name + "'; there are " + names + (scene.rods.size() > 8 ? " ..." : ""));
 }
 
@@ -24,10 +25,13 @@ const Elements &elementsOf(const Simulation &simulation) {
 
 int rodInRange(const Scene &scene, int rod) {
   if (rod >= 0 && rod < int(scene.rods.size())) return rod;
-  throw SceneError("rod " + std::to_string(rod) + " does not exist; rods are 0 to " + std::to_string(scene.rods.size() - 1));
+  throw SceneError("rod " + std::to_string(rod) + " does not exist; rods are 0 to " +
+                   std::to_string(scene.rods.size() - 1));
 }
 
-template <class T> std::vector<T> slice(const std::vector<T> &values, int first, int count) { return {values.begin() + first, values.begin() + first + count}; }
+template <class T> std::vector<T> slice(const std::vector<T> &values, int first, int count) {
+  return {values.begin() + first, values.begin() + first + count};
+}
 
 bool isFinite(double x) { return std::isfinite(x); }
 bool isFinite(const Vec3 &x) { return x.allFinite(); }
@@ -47,19 +51,23 @@ template <class... Parts> std::string text(Parts &&...parts) {
 } // namespace
 
 RodAccess::RodAccess(Simulation &simulation, int rod)
-    : scene_(simulation.scene), elements_(elementsOf(simulation)), state_(simulation.state), dynamic_(simulation.dynamic), index_(rodInRange(scene_, rod)),
-      range_(elements_.rods[index_]), cells_(cellsOf(elements_, index_)) {
+    : scene_(simulation.scene), elements_(elementsOf(simulation)), state_(simulation.state),
+      dynamic_(simulation.dynamic), index_(rodInRange(scene_, rod)), range_(elements_.rods[index_]),
+      cells_(cellsOf(elements_, index_)) {
   for (const Support &support : scene_.supports)
     if (support.rod == index_) supports_.push_back(&support);
 }
 
-RodAccess::RodAccess(Simulation &simulation, const std::string &name) : RodAccess(simulation, rodNamed(simulation.scene, name)) {}
+RodAccess::RodAccess(Simulation &simulation, const std::string &name)
+    : RodAccess(simulation, rodNamed(simulation.scene, name)) {}
 
 std::vector<Vec3> RodAccess::positions() const { return slice(state_.position, range_.first_vertex, range_.vertices); }
 std::vector<Vec3> RodAccess::directors() const { return slice(state_.director, range_.first_edge, range_.edges); }
 std::vector<Vec3> RodAccess::velocities() const { return slice(state_.velocity, range_.first_vertex, range_.vertices); }
 std::vector<double> RodAccess::twistRates() const { return slice(state_.twist_rate, range_.first_edge, range_.edges); }
-std::vector<double> RodAccess::axialForces() const { return slice(state_.axial_force, range_.first_edge, range_.edges); }
+std::vector<double> RodAccess::axialForces() const {
+  return slice(state_.axial_force, range_.first_edge, range_.edges);
+}
 std::vector<double> RodAccess::twists() const { return atVertices(cellTwists(state_)); }
 
 void RodAccess::fail(const std::string &what) const { throw SceneError("rod '" + rod().name + "': " + what); }
@@ -69,7 +77,8 @@ void RodAccess::checkCount(std::size_t given, int wanted, const char *what) cons
 }
 
 bool RodAccess::holds(int vertex, bool (Support::*what)() const) const {
-  return std::any_of(supports_.begin(), supports_.end(), [&](const Support *s) { return s->vertex == vertex && (s->*what)(); });
+  return std::any_of(supports_.begin(), supports_.end(),
+                     [&](const Support *s) { return s->vertex == vertex && (s->*what)(); });
 }
 
 Frame RodAccess::edgeFrame(const State &state, int i) const {
@@ -121,12 +130,15 @@ void RodAccess::setTurns(State &next, std::vector<double> twists, const std::vec
     const LooseCell &cell = cells_[n];
     const double expected = twists[n] + turning(cell.frame1) - turning(cell.frame0);
     const double principal = halfAngleBetween(frameAt(next, cell.frame0), frameAt(next, cell.frame1)).angle();
-    if (!std::isfinite(principal)) fail(text("folds back on itself at vertex ", vertexOf(cell), "; edges may turn by less than 179 degrees"));
+    if (!std::isfinite(principal))
+      fail(text("folds back on itself at vertex ", vertexOf(cell), "; edges may turn by less than 179 degrees"));
     if (rod().measure == Measure::tan && std::abs(principal) > 0.9999 * pi)
-      fail(text("is twisted by half a turn at vertex ", vertexOf(cell), ", the barrier of measure tan; use less, or measure: angle"));
+      fail(text("is twisted by half a turn at vertex ", vertexOf(cell),
+                ", the barrier of measure tan; use less, or measure: angle"));
     turns[n] = 2 * pi * std::round((expected - principal) / (2 * pi));
   }
-  if (rod().measure == Measure::angle) std::copy(turns.begin(), turns.end(), next.turns.begin() + elements_.rod_cells[index_]);
+  if (rod().measure == Measure::angle)
+    std::copy(turns.begin(), turns.end(), next.turns.begin() + elements_.rod_cells[index_]);
 }
 
 void RodAccess::accept(State &&next) {
@@ -153,8 +165,8 @@ void RodAccess::setPositions(const std::vector<Vec3> &x) {
     if (holds(i, &Support::holdsPosition)) {
       const Vec3 &at = state_.position[v];
       if ((x[i] - at).norm() > 1e-9 * length)
-        fail(text("vertex ", i, " is held at (", at[0], ", ", at[1], ", ", at[2], "), and cannot be put at (", x[i][0], ", ", x[i][1], ", ", x[i][2],
-                  "); it moves by the motion of its support"));
+        fail(text("vertex ", i, " is held at (", at[0], ", ", at[1], ", ", at[2], "), and cannot be put at (", x[i][0],
+                  ", ", x[i][1], ", ", x[i][2], "); it moves by the motion of its support"));
       continue;
     }
     next.position[v] = x[i];
@@ -165,10 +177,12 @@ void RodAccess::setPositions(const std::vector<Vec3> &x) {
     Frame after = edgeFrame(next, i);
     if (after.tangent == before.tangent && after.length == before.length) continue;
     // Minimal rotations to the opposite tangent are half turns about any normal: this one is about the director.
-    if (before.tangent.dot(after.tangent) > -1 + 1e-12) after.director = transport<double>(before.director, before.tangent, after.tangent);
+    if (before.tangent.dot(after.tangent) > -1 + 1e-12)
+      after.director = transport<double>(before.director, before.tangent, after.tangent);
     next.director[range_.first_edge + i] = orthonormalised(after.director, after.tangent);
     next.axial_force[range_.first_edge + i] =
-        rod().material.axial_stiffness * axialStrain<double>(rod().energy, after.length, elements_.inverseRestLength()[range_.slot(i)]);
+        rod().material.axial_stiffness *
+        axialStrain<double>(rod().energy, after.length, elements_.inverseRestLength()[range_.slot(i)]);
   }
   setTurns(next, cellTwists(state_), std::vector<double>(range_.edges, 0.0));
   accept(std::move(next));
@@ -182,7 +196,8 @@ void RodAccess::setDirectors(const std::vector<Vec3> &d) {
   for (int i = 0; i < range_.edges; ++i) {
     const Frame f = edgeFrame(state_, i);
     if (!d[i].allFinite() || std::abs(d[i].norm() - 1) > 1e-3 || std::abs(d[i].dot(f.tangent)) > 1e-3)
-      fail(text("the director of edge ", i, " is (", d[i][0], ", ", d[i][1], ", ", d[i][2], "); it must be of unit length and normal to its edge within 1e-3"));
+      fail(text("the director of edge ", i, " is (", d[i][0], ", ", d[i][1], ", ", d[i][2],
+                "); it must be of unit length and normal to its edge within 1e-3"));
     if (d[i] == f.director) continue;
     next.director[range_.first_edge + i] = orthonormalised(d[i], f.tangent);
     by[i] = halfAngleBetween(f, edgeFrame(next, i)).angle();
@@ -212,14 +227,17 @@ void RodAccess::setTwists(const std::vector<double> &angle) {
     const double follows = now[last] + (range_.closed ? by.front() : 0.0) - by.back();
     const double turns = 2 * pi * std::round((angle[last] - follows) / (2 * pi));
     if (std::abs(angle[last] - follows - turns) > 1e-6)
-      fail(text("the twist angle at vertex ", last, " follows from the others: ", follows, ", up to whole turns, and not ", angle[last]));
+      fail(text("the twist angle at vertex ", last, " follows from the others: ", follows,
+                ", up to whole turns, and not ", angle[last]));
     for (std::size_t n = 0; n < cells_.size(); ++n) // into the half cell next to edge 0 of a ring, and the whole one
       if (vertexOf(cells_[n]) == last && (!range_.closed || edgeAt(range_, cells_[n].frame1) >= 0)) cells[n] += turns;
   }
   State next = state_;
   for (int i = 0; i < range_.edges; ++i) {
     const Frame f = edgeFrame(state_, i);
-    if (by[i] != 0) next.director[range_.first_edge + i] = orthonormalised(rotateAbout<double>(f.director, f.tangent, by[i]), f.tangent);
+    if (by[i] != 0)
+      next.director[range_.first_edge + i] =
+          orthonormalised(rotateAbout<double>(f.director, f.tangent, by[i]), f.tangent);
   }
   setTurns(next, cells, by);
   accept(std::move(next));
@@ -253,7 +271,9 @@ void RodAccess::stop() {
 void RodAccess::reset() {
   const State initial = initialState(scene_, elements_);
   State next = state_;
-  auto copy = [](const auto &from, auto &to, int first, int count) { std::copy_n(from.begin() + first, count, to.begin() + first); };
+  auto copy = [](const auto &from, auto &to, int first, int count) {
+    std::copy_n(from.begin() + first, count, to.begin() + first);
+  };
   copy(initial.position, next.position, range_.first_vertex, range_.vertices);
   copy(initial.position_low, next.position_low, range_.first_vertex, range_.vertices);
   copy(initial.velocity, next.velocity, range_.first_vertex, range_.vertices);

@@ -12,7 +12,8 @@ Step TimeLoop::stepOf(const LoopSettings &settings, const State &state, double d
   Step step;
   step.dt = settings.dynamic ? dt : 0;
   step.time = state.time + dt;
-  if (std::abs(step.time - settings.t_end) < 1e-9 * settings.dt) step.time = settings.t_end; // no sliver of a step from rounding
+  if (std::abs(step.time - settings.t_end) < 1e-9 * settings.dt)
+    step.time = settings.t_end; // no sliver of a step from rounding
   step.load_factor = settings.dynamic ? 1 : step.time;
   step.mixed = settings.mixed;
   step.hessian = settings.hessian;
@@ -20,17 +21,20 @@ Step TimeLoop::stepOf(const LoopSettings &settings, const State &state, double d
 }
 
 /// Newton may come to an unstable equilibrium, or pass it and only meet indefinite Hessians.
-static bool mayPassCritical(const NewtonReport &report) { return report.first_negative_pivots > 0 || report.shifts > 0; }
+static bool mayPassCritical(const NewtonReport &report) {
+  return report.first_negative_pivots > 0 || report.shifts > 0;
+}
 
 /// Whether to look behind a critical point for more. It costs some solves of the step.
 bool TimeLoop::isThorough() const {
   return settings_.bifurcation != Bifurcation::locate || solver_.potential().elements().edges() <= most_searched_edges;
 }
 
-/// Stability may be lost within the step: finds where, as often as the way that the run takes loses it, and moves `start` there when the run is to end or to
-/// go on along another branch.
+/// Stability may be lost within the step: finds where, as often as the way that the run takes loses it, and moves
+/// `start` there when the run is to end or to go on along another branch.
 PetscErrorCode TimeLoop::locate(State &start, const Step &step, bool *moved) {
-  constexpr double growth = 8; // of the parts of a step behind a critical point: the shape changes by the root of the way there
+  constexpr double growth =
+      8; // of the parts of a step behind a critical point: the shape changes by the root of the way there
   PetscFunctionBeginUser;
   State from = start, ahead;
   Step part = step;
@@ -61,7 +65,8 @@ PetscErrorCode TimeLoop::locate(State &start, const Step &step, bool *moved) {
       if (on_critical) PetscCall(on_critical(point));
       bool leaves = false;
       Planes mode;
-      if (settings_.bifurcation == Bifurcation::switch_branch) PetscCall(criticalMode(solver_, point, step, &mode, &leaves));
+      if (settings_.bifurcation == Bifurcation::switch_branch)
+        PetscCall(criticalMode(solver_, point, step, &mode, &leaves));
       if (leaves) mode_ = std::move(mode);
       *moved = settings_.bifurcation == Bifurcation::stop || leaves;
       if (*moved) start = *point.state;
@@ -95,7 +100,8 @@ PetscErrorCode TimeLoop::locateNext(const State &start, const Step &step, Critic
     PetscCall(countUnstable(solver_, &to->unstable));
     solver_.potential().commit(to->state);
     // Before a limit point a rod moves by the root of the interval; beyond it, Newton jumps.
-    to->found = to->unstable >= 0 && distanceBetween(from.state, to->state) <= std::sqrt(std::abs(factor - from.parameter) / width);
+    to->found = to->unstable >= 0 &&
+                distanceBetween(from.state, to->state) <= std::sqrt(std::abs(factor - from.parameter) / width);
     PetscFunctionReturn(0);
   };
   BranchPoint low;
@@ -105,7 +111,8 @@ PetscErrorCode TimeLoop::locateNext(const State &start, const Step &step, Critic
   PetscFunctionReturn(0);
 }
 
-/// Displacements along the critical mode from which Newton begins a step: as long, and to the side, as lowers the energy most.
+/// Displacements along the critical mode from which Newton begins a step: as long, and to the side, as lowers the
+/// energy most.
 Guess TimeLoop::alongMode(const State &start, const Step &step) {
   IncrementalPotential &potential = solver_.potential();
   solver_.begin(start, step);
@@ -125,7 +132,8 @@ Guess TimeLoop::alongMode(const State &start, const Step &step) {
   return guess;
 }
 
-/// Solves the stages of a step one after the other; the potential's iterate is the end of the step then. The state is not touched.
+/// Solves the stages of a step one after the other; the potential's iterate is the end of the step then. The state is
+/// not touched.
 PetscErrorCode TimeLoop::solveStages(const State &start, const Step &step, NewtonReport *report) {
   PetscFunctionBeginUser;
   IncrementalPotential &potential = solver_.potential();
@@ -154,7 +162,8 @@ PetscErrorCode TimeLoop::solveStages(const State &start, const Step &step, Newto
     if (!one.converged) PetscFunctionReturn(0);
     stages_.push_back(potential.stageRates(rule));
     more = integrator_->goesOn(start, stages_, iterations);
-    if (dissipates && (more || !integrator_->endsAtStage())) stages_.back().strains = strainsOf(potential.elements(), potential.iterate());
+    if (dissipates && (more || !integrator_->endsAtStage()))
+      stages_.back().strains = strainsOf(potential.elements(), potential.iterate());
   }
   if (!integrator_->endsAtStage() && !potential.moveOn(step.time, integrator_->end(start, step.dt, stages_))) {
     report->converged = false;
@@ -173,7 +182,8 @@ void TimeLoop::noteActions(const State &start, RodSet rods) {
   }
 }
 
-/// Of the step just solved, without what the inertia of held vertices takes. Weights of what is not remembered are those of the last stage.
+/// Of the step just solved, without what the inertia of held vertices takes. Weights of what is not remembered are
+/// those of the last stage.
 Work TimeLoop::dynamicWork(const State &start, double h) const {
   const IncrementalPotential &potential = solver_.potential();
   const Scene &scene = potential.scene();
@@ -185,9 +195,12 @@ Work TimeLoop::dynamicWork(const State &start, double h) const {
   for (std::size_t j = 0; j < weights.size(); ++j)
     for (std::size_t k = 0; k < n; ++k) {
       const std::size_t past = (j - actions_.size()) * n + k;
-      mean[k] += weights[j] * (j < actions_.size() ? actions_[j][k] : past < start.support_actions.size() ? start.support_actions[past] : actions_.back()[k]);
+      mean[k] += weights[j] * (j < actions_.size()                   ? actions_[j][k]
+                               : past < start.support_actions.size() ? start.support_actions[past]
+                                                                     : actions_.back()[k]);
     }
-  work.supports = workOfSupports(scene, potential.elements(), potential.start(), potential.iterate(), start.time, potential.step().time, mean);
+  work.supports = workOfSupports(scene, potential.elements(), potential.start(), potential.iterate(), start.time,
+                                 potential.step().time, mean);
   return work;
 }
 
@@ -199,7 +212,8 @@ double TimeLoop::movedKinetic(const State &state) const {
     const Support &support = potential.scene().supports[s];
     const RodRange &rod = potential.elements().rods[support.rod];
     if (support.holdsPosition())
-      sum += 0.5 * potential.elements().mass()[rod.slot(support.vertex)] * state.velocity[rod.first_vertex + support.vertex].squaredNorm();
+      sum += 0.5 * potential.elements().mass()[rod.slot(support.vertex)] *
+             state.velocity[rod.first_vertex + support.vertex].squaredNorm();
   }
   return sum;
 }
@@ -212,7 +226,8 @@ void TimeLoop::finishStages(State &state, double h) {
   if (keeps) {
     std::vector<double> before = strainsOf(potential.elements(), potential.start());
     if (integrator_->remembersStrains() > 1)
-      before.insert(before.end(), state.strains.begin(), state.strains.begin() + std::min(before.size(), state.strains.size()));
+      before.insert(before.end(), state.strains.begin(),
+                    state.strains.begin() + std::min(before.size(), state.strains.size()));
     state.strains = std::move(before);
   }
   if (keeps && !integrator_->endsAtStage()) // as far beyond the middle
@@ -252,7 +267,9 @@ TimeLoop::StepError TimeLoop::stepError(const State &start, double h) const {
       turned += std::pow(stages_.back().displacement.edge[e], 2);
     }
     const double length = std::max(potential.length(int(r)), 1e-300);
-    auto norm = [&](double positions, double twists) { return std::sqrt(positions / (length * length * rod.vertices) + twists / rod.edges); };
+    auto norm = [&](double positions, double twists) {
+      return std::sqrt(positions / (length * length * rod.vertices) + twists / rod.edges);
+    };
     worst.error = std::max(worst.error, norm(wrong, turned_wrong));
     worst.moved = std::max(worst.moved, norm(moved, turned));
   }
@@ -265,22 +282,28 @@ double TimeLoop::nextStep(double time, double *landing) const {
   const bool fixed = settings_.adapt == Adaptation::none;
   const double interval = settings_.output_interval;
   if (interval > 0) *landing = std::min(settings_.t_end, interval * (1 + std::floor(time / interval * (1 + 1e-12))));
-  const double left = *landing - time, parts = std::max(1.0, std::ceil(left / control.dt * (1 - 1e-9))), h = left / parts;
+  const double left = *landing - time, parts = std::max(1.0, std::ceil(left / control.dt * (1 - 1e-9))),
+               h = left / parts;
   if (!fixed) return h;
   if (interval == 0) return std::min(control.dt, left);
   return std::abs(h - control.dt) < 1e-9 * control.dt ? control.dt : h; // dt itself where it divides the interval
 }
 
-/// Proportional-integral control of the step (Gustafsson, Lundh and Soederlind 1988): sets the next one, and tells whether this one is good enough.
+/// Proportional-integral control of the step (Gustafsson, Lundh and Soederlind 1988): sets the next one, and tells
+/// whether this one is good enough.
 bool TimeLoop::adapt(double h, double dt_min, const StepError &error) {
   if (!error.known) return true;
   const double power = 1.0 / (integrator_->order() + 1);
   const double ratio = std::max(error.error / (settings_.dt_atol + settings_.dt_rtol * error.moved), 1e-10);
   const bool accept = ratio <= 1 || h <= dt_min * (1 + 1e-9);
   double factor = std::clamp(0.9 * std::pow(ratio, -power), 0.1, 0.9);
-  if (ratio <= 1) factor = std::clamp(0.9 * std::pow(ratio, -0.7 * power) * std::pow(control.error > 0 ? control.error : ratio, 0.4 * power), 0.5, 2.0);
+  if (ratio <= 1)
+    factor = std::clamp(0.9 * std::pow(ratio, -0.7 * power) *
+                            std::pow(control.error > 0 ? control.error : ratio, 0.4 * power),
+                        0.5, 2.0);
   double next = factor * h;
-  if (accept && factor >= 1) next = std::max(next, control.dt); // a step cut short to land says nothing against the length asked for
+  if (accept && factor >= 1)
+    next = std::max(next, control.dt); // a step cut short to land says nothing against the length asked for
   if (settings_.dt_max > 0) next = std::min(next, settings_.dt_max);
   control.dt = std::max(next, dt_min);
   if (accept) control.error = ratio;
@@ -302,7 +325,9 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
   PetscCall(PetscTime(&begin));
   // A run that begins has no step behind it, whatever the loop has run before.
   const bool goes_on = !std::isnan(control.energy) && (settings_.dynamic || state.time > 0);
-  if (!goes_on) control.energy = energyBudget(potential.scene(), potential.elements(), state, settings_.dynamic ? 1 : state.time).total();
+  if (!goes_on)
+    control.energy =
+        energyBudget(potential.scene(), potential.elements(), state, settings_.dynamic ? 1 : state.time).total();
   moving_ = movingSupports(potential.scene());
   Work work; // since the last row
   *finished = false;
@@ -310,7 +335,8 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
   State next = state; // what the blocks that have converged come to; the state itself stays as it is until all have
   EnergyBudget energy;
   while (state.time < settings_.t_end) {
-    if (settings_.dynamic && state.memory.empty()) PetscCall(integrator_->begin(solver_, dt, state)); // at the start, and where the state was written
+    if (settings_.dynamic && state.memory.empty())
+      PetscCall(integrator_->begin(solver_, dt, state)); // at the start, and where the state was written
     double landing;
     const double h = nextStep(state.time, &landing);
     Step step = stepOf(settings_, state, h);
@@ -323,7 +349,8 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     NewtonReport report;
     energy = {};
     auto addEnergy = [&](const State &end, int r) {
-      energy += energyBudget(potential.scene(), potential.elements(), end, potential.iterate(), settings_.dynamic ? 1 : step.time, r);
+      energy += energyBudget(potential.scene(), potential.elements(), end, potential.iterate(),
+                             settings_.dynamic ? 1 : step.time, r);
     };
     StepError error;
     if (plain) { // each block is committed while it is in the cache
@@ -348,8 +375,10 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
       }
     }
     // Couples have no potential: the inertia of the symmetric part says nothing about stability.
-    const bool detects = !settings_.dynamic && settings_.bifurcation != Bifurcation::off && potential.scene().moments.empty();
-    const bool passed = report.first_negative_pivots > 0 || (settings_.bifurcation != Bifurcation::locate && mayPassCritical(report));
+    const bool detects =
+        !settings_.dynamic && settings_.bifurcation != Bifurcation::off && potential.scene().moments.empty();
+    const bool passed =
+        report.first_negative_pivots > 0 || (settings_.bifurcation != Bifurcation::locate && mayPassCritical(report));
     if (detects && stable && passed && located_ <= state.time) {
       bool moved = false;
       const State before = state;
@@ -371,7 +400,9 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     if (report.converged && plain) {
       next.time = step.time;
       next.step = state.step + 1;
-      if (!settings_.dynamic) work += staticWork(potential.scene(), potential.elements(), state, next, potential.start(), potential.iterate());
+      if (!settings_.dynamic)
+        work +=
+            staticWork(potential.scene(), potential.elements(), state, next, potential.start(), potential.iterate());
       std::swap(state, next);
     } else if (report.converged) {
       finishStages(state, h);
@@ -388,8 +419,9 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
       const double shortest = settings_.dt_min > 0 ? dt_min : std::min(dt_min, (settings_.t_end - state.time) / 1024);
       if (!report.lost && dt >= shortest * (1 - 1e-9)) continue;
       std::ostringstream message;
-      message << (settings_.dynamic ? "step at time " : "load step at factor ") << state.time << " failed with " << (settings_.dynamic ? "dt " : "increment ")
-              << h << ": " << report.reason << " (" << report.iterations << (report.iterations == 1 ? " iteration)" : " iterations)");
+      message << (settings_.dynamic ? "step at time " : "load step at factor ") << state.time << " failed with "
+              << (settings_.dynamic ? "dt " : "increment ") << h << ": " << report.reason << " (" << report.iterations
+              << (report.iterations == 1 ? " iteration)" : " iterations)");
       failure_ = message.str();
       PetscFunctionReturn(0);
     }

@@ -6,10 +6,12 @@ namespace {
 
 class BendTwist final : public Term {
 public:
-  BendTwist(const Scene &scene, const Elements &elements) : scene_(scene), elements_(elements), cells_(elements.cells()) {}
+  BendTwist(const Scene &scene, const Elements &elements)
+      : scene_(scene), elements_(elements), cells_(elements.cells()) {}
 
-  /// Dissipation proportional to stiffness is a second quadratic in the same strains: stiffness k and rest r with damping ratio
-  /// q = beta/dt around the strain s at the start (dampedRest) combine into stiffness k (1 + q) and rest (r + q s)/(1 + q).
+  /// Dissipation proportional to stiffness is a second quadratic in the same strains: stiffness k and rest r with
+  /// damping ratio q = beta/dt around the strain s at the start (dampedRest) combine into stiffness k (1 + q) and rest
+  /// (r + q s)/(1 + q).
   void beginStep(const State &, const Configuration &start, const Step &step, int r) override {
     const double beta = scene_.rods[r].material.stiffness_damping_coefficient;
     if (beta == 0) return;
@@ -17,19 +19,23 @@ public:
     forCells(elements_, r, [&]<class T>(const LooseCell &cell, int count) {
       const std::array<T, 3> s = presentStrain<T>(elements_, start, r, cell, count);
       for (int k = 0; k < 3; ++k) {
-        write(cells_[cell_stiffness + k] + cell.slot, T(read<T>(elements_.cells()[cell_stiffness + k] + cell.slot) * T(1 + q)));
-        write(
-            cells_[cell_rest + k] + cell.slot,
-            T((read<T>(elements_.cells()[cell_rest + k] + cell.slot) + T(q) * dampedRest(step, s[k], (k + 1) * strainRow(elements_) + cell.slot)) / T(1 + q)));
+        write(cells_[cell_stiffness + k] + cell.slot,
+              T(read<T>(elements_.cells()[cell_stiffness + k] + cell.slot) * T(1 + q)));
+        write(cells_[cell_rest + k] + cell.slot,
+              T((read<T>(elements_.cells()[cell_rest + k] + cell.slot) +
+                 T(q) * dampedRest(step, s[k], (k + 1) * strainRow(elements_) + cell.slot)) /
+                T(1 + q)));
       }
     });
   }
 
   double energy(const Configuration &configuration, int rod) const override {
-    return elements_.measure[rod] == Measure::tan ? total<Measure::tan>(configuration, rod) : total<Measure::angle>(configuration, rod);
+    return elements_.measure[rod] == Measure::tan ? total<Measure::tan>(configuration, rod)
+                                                  : total<Measure::angle>(configuration, rod);
   }
 
-  void addDerivatives(const Configuration &configuration, int rod, Derivatives &out, HessianKind hessian) const override {
+  void addDerivatives(const Configuration &configuration, int rod, Derivatives &out,
+                      HessianKind hessian) const override {
     elements_.measure[rod] == Measure::tan ? assemble<Measure::tan>(configuration, rod, hessian, out)
                                            : assemble<Measure::angle>(configuration, rod, hessian, out);
   }
@@ -57,7 +63,8 @@ private:
     return energy + reduce(energies);
   }
 
-  /// Where the derivatives of a cell go: the planes of its vertices' gradient and of its edges' blocks, from its first edge's slot on.
+  /// Where the derivatives of a cell go: the planes of its vertices' gradient and of its edges' blocks, from its first
+  /// edge's slot on.
   template <class T> struct Adder {
     const std::array<double *, slot_size> &gradient;
     const BlockPlanes &blocks;
@@ -77,7 +84,8 @@ private:
     void putGradient(int, const T &) const {}
   };
 
-  template <Measure measure> void assemble(const Configuration &configuration, int rod, HessianKind hessian, Derivatives &out) const {
+  template <Measure measure>
+  void assemble(const Configuration &configuration, int rod, HessianKind hessian, Derivatives &out) const {
     std::array<double *, slot_size> gradient;
     for (int a = 0; a < slot_size; ++a) gradient[a] = out.equilibrium[a];
     const BlockPlanes blocks(out.blocks, elements_.rods[rod]);
@@ -91,7 +99,8 @@ private:
   }
 
   template <Measure measure>
-  [[gnu::flatten, gnu::noinline]] void addGradients(const Configuration &c, int rod, const std::array<double *, slot_size> &gradient) const {
+  [[gnu::flatten, gnu::noinline]] void addGradients(const Configuration &c, int rod,
+                                                    const std::array<double *, slot_size> &gradient) const {
     forCells(elements_, rod, [&]<class T>(const LooseCell &cell, int count) {
       const auto f = cellFrames<T>(c, cell, count);
       const std::array<T, cell_size> g = cellGradient<measure>(f[0], f[1], cellOf<T>(cells_, c, cell.slot));
@@ -100,17 +109,20 @@ private:
   }
 
   template <Measure measure>
-  [[gnu::flatten, gnu::noinline]] void addAll(const Configuration &c, int rod, const std::array<double *, slot_size> &gradient,
+  [[gnu::flatten, gnu::noinline]] void addAll(const Configuration &c, int rod,
+                                              const std::array<double *, slot_size> &gradient,
                                               const BlockPlanes &blocks) const {
     forCells(elements_, rod, [&]<class T>(const LooseCell &cell, int count) {
       const auto f = cellFrames<T>(c, cell, count);
-      cellDerivatives<measure>(f[0], f[1], cellOf<T>(cells_, c, cell.slot), Adder<T>{gradient, blocks, cell.vertex - 1});
+      cellDerivatives<measure>(f[0], f[1], cellOf<T>(cells_, c, cell.slot),
+                               Adder<T>{gradient, blocks, cell.vertex - 1});
     });
   }
 
   /// The Hessian that cells would have if they were at rest as they are.
   template <Measure measure>
-  [[gnu::flatten, gnu::noinline]] void addGaussNewton(const Configuration &c, int rod, const std::array<double *, slot_size> &gradient,
+  [[gnu::flatten, gnu::noinline]] void addGaussNewton(const Configuration &c, int rod,
+                                                      const std::array<double *, slot_size> &gradient,
                                                       const BlockPlanes &blocks) const {
     forCells(elements_, rod, [&]<class T>(const LooseCell &cell, int count) {
       const auto f = cellFrames<T>(c, cell, count);
@@ -123,6 +135,8 @@ private:
 
 } // namespace
 
-std::unique_ptr<Term> makeBendTwist(const Scene &scene, const Elements &elements) { return std::make_unique<BendTwist>(scene, elements); }
+std::unique_ptr<Term> makeBendTwist(const Scene &scene, const Elements &elements) {
+  return std::make_unique<BendTwist>(scene, elements);
+}
 
 } // namespace tendril

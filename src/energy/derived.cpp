@@ -6,7 +6,8 @@
 namespace tendril {
 namespace {
 
-/// Where a cell lies: its vertex and edges in scene order, whether it is the half cell of the edge before or behind it, and whether a rod ends there.
+/// Where a cell lies: its vertex and edges in scene order, whether it is the half cell of the edge before or behind it,
+/// and whether a rod ends there.
 struct CellPlace {
   enum Kind { full, before, behind } kind;
   int vertex, edge0, edge1;
@@ -16,8 +17,11 @@ struct CellPlace {
 CellPlace placeOf(const RodRange &rod, const LooseCell &cell, const CellOf<double> &constants) {
   auto wrapped = [&](int slot) { return (slot - rod.first_slot) % rod.vertices; };
   const int i = wrapped(cell.vertex);
-  const CellPlace::Kind kind = constants.free[0] == 0 ? CellPlace::behind : constants.free[1] == 0 ? CellPlace::before : CellPlace::full;
-  return {kind, rod.first_vertex + i, rod.first_edge + (i + rod.vertices - 1) % rod.vertices, rod.first_edge + i, !rod.closed && (i == 0 || i == rod.edges)};
+  const CellPlace::Kind kind = constants.free[0] == 0   ? CellPlace::behind
+                               : constants.free[1] == 0 ? CellPlace::before
+                                                        : CellPlace::full;
+  return {kind, rod.first_vertex + i, rod.first_edge + (i + rod.vertices - 1) % rod.vertices, rod.first_edge + i,
+          !rod.closed && (i == 0 || i == rod.edges)};
 }
 
 /// Calls visit(frames, constants, Lbar, place, measure) for the cells of every rod.
@@ -29,17 +33,20 @@ template <class Visit> void eachCell(const Elements &elements, const Configurati
         const CellOf<double> constants = cellOf<double>(elements.cells(), c, cell.slot);
         const double length = elements.cellLength()[cell.slot];
         if (length == 0) continue; // a clamp inside a rod: its half cells are loose
-        visit(std::array{c.frameAt(cell.frame0), c.frameAt(cell.frame1)}, constants, length, placeOf(elements.rods[r], cell, constants), elements.measure[r]);
+        visit(std::array{c.frameAt(cell.frame0), c.frameAt(cell.frame1)}, constants, length,
+              placeOf(elements.rods[r], cell, constants), elements.measure[r]);
       }
     });
 }
 
 } // namespace
 
-RodStrains rodStrains(const Scene &scene, const Elements &elements, const State &state, double motion_time, double load_factor) {
+RodStrains rodStrains(const Scene &scene, const Elements &elements, const State &state, double motion_time,
+                      double load_factor) {
   const Configuration c = configurationOf(state, scene, elements, motion_time);
   const std::size_t nv = state.position.size();
-  RodStrains out{std::vector<Eigen::Vector2d>(nv, Eigen::Vector2d::Zero()), std::vector<double>(nv, 0.0), std::vector<double>(nv, 0.0)};
+  RodStrains out{std::vector<Eigen::Vector2d>(nv, Eigen::Vector2d::Zero()), std::vector<double>(nv, 0.0),
+                 std::vector<double>(nv, 0.0)};
   std::vector<double> length(nv, 0.0);
   for (std::size_t i = 0; i < state.director.size(); ++i) {
     const int slot = elements.edge_slot[i];
@@ -49,14 +56,20 @@ RodStrains rodStrains(const Scene &scene, const Elements &elements, const State 
       length[v] += half;
     }
   }
-  eachCell(elements, c, [&](const std::array<Frame, 2> &f, const CellOf<double> &k, double cell_length, const CellPlace &place, Measure measure) {
-    const std::array<double, 3> s = measure == Measure::tan ? cellStrain<Measure::tan>(f[0], f[1], k) : cellStrain<Measure::angle>(f[0], f[1], k);
-    for (int a = 0; a < 3; ++a) out.strain_energy_density[place.vertex] += 0.5 * k.stiffness[a] * (s[a] - k.rest[a]) * (s[a] - k.rest[a]);
-    const bool bends = k.stiffness[0] != 0 || k.stiffness[1] != 0; // half cells that hold the twist only do not
-    if (place.kind != CellPlace::full && !place.at_end && (place.kind == CellPlace::before || !bends)) return;
-    if (bends) out.curvature[place.vertex] = Eigen::Vector2d(s[0], s[1]) / cell_length;
-    out.twist[place.vertex] = s[2] / cell_length;
-  });
+  eachCell(elements, c,
+           [&](const std::array<Frame, 2> &f, const CellOf<double> &k, double cell_length, const CellPlace &place,
+               Measure measure) {
+             const std::array<double, 3> s = measure == Measure::tan ? cellStrain<Measure::tan>(f[0], f[1], k)
+                                                                     : cellStrain<Measure::angle>(f[0], f[1], k);
+             for (int a = 0; a < 3; ++a)
+               out.strain_energy_density[place.vertex] +=
+                   0.5 * k.stiffness[a] * (s[a] - k.rest[a]) * (s[a] - k.rest[a]);
+             const bool bends =
+                 k.stiffness[0] != 0 || k.stiffness[1] != 0; // half cells that hold the twist only do not
+             if (place.kind != CellPlace::full && !place.at_end && (place.kind == CellPlace::before || !bends)) return;
+             if (bends) out.curvature[place.vertex] = Eigen::Vector2d(s[0], s[1]) / cell_length;
+             out.twist[place.vertex] = s[2] / cell_length;
+           });
   for (std::size_t r = 0; r < elements.rods.size(); ++r)
     for (const EndCouple &end : elements.end_couples[r]) {
       const std::array<double, 3> e = endEnergy(elements, c, end, load_factor);
@@ -67,20 +80,24 @@ RodStrains rodStrains(const Scene &scene, const Elements &elements, const State 
   return out;
 }
 
-RodActions rodActions(const Scene &scene, const Elements &elements, const State &state, double motion_time, double load_factor) {
+RodActions rodActions(const Scene &scene, const Elements &elements, const State &state, double motion_time,
+                      double load_factor) {
   const Configuration c = configurationOf(state, scene, elements, motion_time);
   RodActions out{std::vector<Vec3>(state.director.size()), std::vector<Vec3>(state.position.size(), Vec3::Zero()),
-                 std::vector<Vec3>(scene.supports.size(), Vec3::Zero()), std::vector<Vec3>(scene.supports.size(), Vec3::Zero())};
+                 std::vector<Vec3>(scene.supports.size(), Vec3::Zero()),
+                 std::vector<Vec3>(scene.supports.size(), Vec3::Zero())};
   for (std::size_t r = 0; r < elements.rods.size(); ++r) {
     const RodRange &rod = elements.rods[r];
     for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
       const int slot = elements.edge_slot[i];
       // The axial force of the state is more exact than that of the strain, but holds dissipation while the edge moves.
-      const bool damped =
-          scene.rods[r].material.stiffness_damping_coefficient != 0 && state.velocity[elements.vertex0[i]] != state.velocity[elements.vertex1[i]];
-      const double axial = damped ? elements.axialStiffness()[slot] * c[Configuration::strain][slot] : state.axial_force[i];
+      const bool damped = scene.rods[r].material.stiffness_damping_coefficient != 0 &&
+                          state.velocity[elements.vertex0[i]] != state.velocity[elements.vertex1[i]];
+      const double axial =
+          damped ? elements.axialStiffness()[slot] * c[Configuration::strain][slot] : state.axial_force[i];
       const Frame f = c.frameAt(slot);
-      out.force[i] = stretchGradient(f, axial, strainSlope(elements.energy[r], f.length, elements.inverseRestLength()[slot]));
+      out.force[i] =
+          stretchGradient(f, axial, strainSlope(elements.energy[r], f.length, elements.inverseRestLength()[slot]));
     }
   }
   // A couple acts by a pair of forces on the ends of its edge, which is not a force in the rod.
@@ -89,20 +106,25 @@ RodActions rodActions(const Scene &scene, const Elements &elements, const State 
     const Frame f = c.frameAt(elements.edge_slot[i]);
     out.force[i] -= load_factor / f.length * m.moment.cross(f.tangent);
   }
-  eachCell(elements, c, [&](const std::array<Frame, 2> &f, const CellOf<double> &k, double, const CellPlace &place, Measure measure) {
-    const std::array<double, cell_size> d = measure == Measure::tan ? cellGradient<Measure::tan>(f[0], f[1], k) : cellGradient<Measure::angle>(f[0], f[1], k);
-    const Vec3 by_edge0 = -Eigen::Map<const Vec3>(&d[0]), by_edge1 = Eigen::Map<const Vec3>(&d[8]);
-    if (place.kind != CellPlace::behind) out.force[place.edge0] += by_edge0;
-    if (place.kind != CellPlace::before) out.force[place.edge1] += by_edge1;
-    if (place.kind != CellPlace::before || place.at_end) out.moment[place.vertex] += cellMoment(f[0], f[1], k, d);
-  });
+  eachCell(
+      elements, c,
+      [&](const std::array<Frame, 2> &f, const CellOf<double> &k, double, const CellPlace &place, Measure measure) {
+        const std::array<double, cell_size> d = measure == Measure::tan ? cellGradient<Measure::tan>(f[0], f[1], k)
+                                                                        : cellGradient<Measure::angle>(f[0], f[1], k);
+        const Vec3 by_edge0 = -Eigen::Map<const Vec3>(&d[0]), by_edge1 = Eigen::Map<const Vec3>(&d[8]);
+        if (place.kind != CellPlace::behind) out.force[place.edge0] += by_edge0;
+        if (place.kind != CellPlace::before) out.force[place.edge1] += by_edge1;
+        if (place.kind != CellPlace::before || place.at_end) out.moment[place.vertex] += cellMoment(f[0], f[1], k, d);
+      });
   for (std::size_t k = 0; k < scene.supports.size(); ++k) {
     const Support &support = scene.supports[k];
-    if (const int frame = elements.support_slot[k]; frame >= 0) out.reaction_moment[k] = momentOn(elements, elements.cells(), c, support.rod, frame);
+    if (const int frame = elements.support_slot[k]; frame >= 0)
+      out.reaction_moment[k] = momentOn(elements, elements.cells(), c, support.rod, frame);
     if (!support.holdsPosition()) continue;
     const Rod &rod = scene.rods[support.rod];
     const RodRange &range = elements.rods[support.rod];
-    const int v = range.first_vertex + support.vertex, before = rod.edgeBefore(support.vertex), after = rod.edgeAfter(support.vertex);
+    const int v = range.first_vertex + support.vertex, before = rod.edgeBefore(support.vertex),
+              after = rod.edgeAfter(support.vertex);
     const double mass = elements.mass()[elements.vertex_slot[v]];
     Vec3 loads = scene.rotation.matrix() * (state.position[v] - scene.rotation.centre) * mass;
     if (rod.gravity) loads += mass * scene.gravity;

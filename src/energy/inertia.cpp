@@ -1,4 +1,5 @@
-/// Inertia of a stage of a time step with dissipation proportional to mass: sum of weight/2 |q - predicted|^2 over positions and twists.
+/// Inertia of a stage of a time step with dissipation proportional to mass: sum of weight/2 |q - predicted|^2 over
+/// positions and twists.
 #include "tendril/energy/edge.hpp"
 #include "tendril/energy/term.hpp"
 
@@ -10,8 +11,9 @@ public:
   Inertia(const Scene &scene, const Elements &elements)
       : scene_(scene), elements_(elements), predicted_(slot_size, elements.slots), weight_(scene.rods.size()) {}
 
-  /// With v = d/dt + u and acceleration (mass v + b)/dt (StageRule), inertia and dissipation are m (mass/dt^2 + alpha/dt) (d - d_hat),
-  /// d_hat = -dt u - b dt/(mass + alpha dt); the same for the twist increment. Backward Euler has mass 1, u = 0 and b = -v_n.
+  /// With v = d/dt + u and acceleration (mass v + b)/dt (StageRule), inertia and dissipation are m (mass/dt^2 +
+  /// alpha/dt) (d - d_hat), d_hat = -dt u - b dt/(mass + alpha dt); the same for the twist increment. Backward Euler
+  /// has mass 1, u = 0 and b = -v_n.
   void beginStep(const State &state, const Configuration &start, const Step &step, int r) override {
     start_ = &start;
     reference_ = step.twist_reference ? step.twist_reference : &start;
@@ -23,11 +25,13 @@ public:
     if (step.rule) {
       for (int i = 0; i < rod.vertices; ++i) {
         const int v = rod.first_vertex + i;
-        predicted_.setVector(0, rod.slot(i), -step.dt * step.rule->velocity.atVertex(v) - reach * step.rule->acceleration.atVertex(v));
+        predicted_.setVector(0, rod.slot(i),
+                             -step.dt * step.rule->velocity.atVertex(v) - reach * step.rule->acceleration.atVertex(v));
       }
       for (int i = 0; i < rod.edges; ++i) {
         const int e = rod.first_edge + i;
-        predicted_[3][rod.slot(i)] = -step.dt * step.rule->velocity.atEdge(e) - reach * step.rule->acceleration.atEdge(e);
+        predicted_[3][rod.slot(i)] =
+            -step.dt * step.rule->velocity.atEdge(e) - reach * step.rule->acceleration.atEdge(e);
       }
       return;
     }
@@ -40,7 +44,8 @@ public:
     const RodRange &rod = elements_.rods[r];
     Pack total(0.0);
     for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes)
-      total += read<Pack>(elements_.mass() + s) * (c.displacements<Pack>(s, *start_) - readVector<Pack>(predicted_, 0, s)).squaredNorm();
+      total += read<Pack>(elements_.mass() + s) *
+               (c.displacements<Pack>(s, *start_) - readVector<Pack>(predicted_, 0, s)).squaredNorm();
     if (rod.twist)
       for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
         const Pack d = spinOver(*reference_, c, s) - read<Pack>(predicted_[3] + s);
@@ -49,7 +54,8 @@ public:
     return 0.5 * weight_[r] * reduce(total);
   }
 
-  [[gnu::flatten]] void addDerivatives(const Configuration &c, int r, Derivatives &out, HessianKind hessian) const override {
+  [[gnu::flatten]] void addDerivatives(const Configuration &c, int r, Derivatives &out,
+                                       HessianKind hessian) const override {
     const RodRange &rod = elements_.rods[r];
     const BlockPlanes blocks(out.blocks, rod);
     for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) {
@@ -63,8 +69,10 @@ public:
     if (!rod.twist) return;
     for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
       const Pack difference = spinOver(*reference_, c, s) - read<Pack>(predicted_[3] + s);
-      const auto d = twistInertia<Pack>(reference_->frames<Pack>(s), c.frames<Pack>(s), Pack(weight_[r]) * read<Pack>(elements_.twistMass() + s), difference);
-      // What belongs to the first vertex of the edges before what belongs to the second, whose memory overlaps (see cellDerivatives).
+      const auto d = twistInertia<Pack>(reference_->frames<Pack>(s), c.frames<Pack>(s),
+                                        Pack(weight_[r]) * read<Pack>(elements_.twistMass() + s), difference);
+      // What belongs to the first vertex of the edges before what belongs to the second, whose memory overlaps (see
+      // cellDerivatives).
       addTo(out.equilibrium[3] + s, d.gradient[3]);
       for (int a = 0; a < 3; ++a) addTo<Pack>(out.equilibrium[a] + s, -d.gradient[a]);
       if (hessian != HessianKind::none) {
@@ -78,13 +86,16 @@ public:
 private:
   const Scene &scene_;
   const Elements &elements_;
-  const Configuration *start_ = nullptr, *reference_ = nullptr; ///< what displacements, and what twists are measured from
-  Planes predicted_;                                            ///< displacements and twists
+  const Configuration *start_ = nullptr,
+                      *reference_ = nullptr; ///< what displacements, and what twists are measured from
+  Planes predicted_;                         ///< displacements and twists
   std::vector<double> weight_;
 };
 
 } // namespace
 
-std::unique_ptr<Term> makeInertia(const Scene &scene, const Elements &elements) { return std::make_unique<Inertia>(scene, elements); }
+std::unique_ptr<Term> makeInertia(const Scene &scene, const Elements &elements) {
+  return std::make_unique<Inertia>(scene, elements);
+}
 
 } // namespace tendril

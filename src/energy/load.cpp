@@ -4,21 +4,24 @@
 namespace tendril {
 namespace {
 
-/// Dead forces have the potential -F.(x - x_start). A couple does the work M.t d(theta) + M.(t x dt) along the path of the iterates; it has
-/// no potential over large rotations, so it is measured from the last iterate: all that a line search compares starts there.
+/// Dead forces have the potential -F.(x - x_start). A couple does the work M.t d(theta) + M.(t x dt) along the path of
+/// the iterates; it has no potential over large rotations, so it is measured from the last iterate: all that a line
+/// search compares starts there.
 class Load final : public Term {
 public:
   Load(const Scene &scene, const Elements &elements)
-      : elements_(elements), turns_(!scene.rotation.angular_velocity.isZero(0)), centre_(scene.rotation.centre), spin_(scene.rotation.matrix()),
-        full_(3, elements.slots), couples_(scene.rods.size()) {
+      : elements_(elements), turns_(!scene.rotation.angular_velocity.isZero(0)), centre_(scene.rotation.centre),
+        spin_(scene.rotation.matrix()), full_(3, elements.slots), couples_(scene.rods.size()) {
     for (std::size_t r = 0; r < scene.rods.size(); ++r)
       if (scene.rods[r].gravity)
-        for (int s = elements.rods[r].first_slot; s < elements.rods[r].vertexEnd(); ++s) full_.setVector(0, s, elements.mass()[s] * scene.gravity);
+        for (int s = elements.rods[r].first_slot; s < elements.rods[r].vertexEnd(); ++s)
+          full_.setVector(0, s, elements.mass()[s] * scene.gravity);
     for (const NodalForce &f : scene.forces) {
       const int s = elements.rods[f.rod].slot(f.vertex);
       full_.setVector(0, s, full_.vector(0, s) + f.force);
     }
-    for (const EdgeMoment &m : scene.moments) couples_[m.rod].push_back({m, elements.rods[m.rod].slot(m.edge), Vec3::Zero(), 0.0});
+    for (const EdgeMoment &m : scene.moments)
+      couples_[m.rod].push_back({m, elements.rods[m.rod].slot(m.edge), Vec3::Zero(), 0.0});
     force_ = full_;
   }
 
@@ -46,19 +49,22 @@ public:
   double energy(const Configuration &c, int r) const override {
     const RodRange &rod = elements_.rods[r];
     Pack work(0.0);
-    for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) work += readVector<Pack>(force_, 0, s).dot(c.displacements<Pack>(s, *start_));
+    for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes)
+      work += readVector<Pack>(force_, 0, s).dot(c.displacements<Pack>(s, *start_));
     double sum = -reduce(work);
     if (turns_) {
       Pack centrifugal(0.0);
       for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) {
         const Vector3<Pack> x = c.positions<Pack>(s), a = accelerationAt(x);
         centrifugal +=
-            read<Pack>(elements_.mass() + s) * ((x[0] - Pack(centre_[0])) * a[0] + (x[1] - Pack(centre_[1])) * a[1] + (x[2] - Pack(centre_[2])) * a[2]);
+            read<Pack>(elements_.mass() + s) *
+            ((x[0] - Pack(centre_[0])) * a[0] + (x[1] - Pack(centre_[1])) * a[1] + (x[2] - Pack(centre_[2])) * a[2]);
       }
       sum -= 0.5 * factor_ * reduce(centrifugal);
     }
     for (const Couple &m : couples_[r])
-      sum -= factor_ * coupleWork(m.moment, m.torque, m.tangent, c.frameAt(m.slot).tangent, c[Configuration::spin][m.slot] - m.spin);
+      sum -= factor_ * coupleWork(m.moment, m.torque, m.tangent, c.frameAt(m.slot).tangent,
+                                  c[Configuration::spin][m.slot] - m.spin);
     return sum;
   }
 
@@ -66,14 +72,16 @@ public:
     const RodRange &rod = elements_.rods[r];
     const BlockPlanes blocks(out.blocks, rod);
     for (int a = 0; a < 3; ++a)
-      for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) addTo<Pack>(out.equilibrium[a] + s, -read<Pack>(force_[a] + s));
+      for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes)
+        addTo<Pack>(out.equilibrium[a] + s, -read<Pack>(force_[a] + s));
     if (turns_)
       for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) {
         const Pack weight = Pack(factor_) * read<Pack>(elements_.mass() + s);
         const Vector3<Pack> a = accelerationAt(c.positions<Pack>(s));
         for (int k = 0; k < 3; ++k) {
           addTo<Pack>(out.equilibrium[k] + s, -weight * a[k]);
-          for (int l = k; l < 3 && hessian != HessianKind::none; ++l) addTo<Pack>(blocks.vertex(k, l) + s, -weight * Pack(spin_(k, l)));
+          for (int l = k; l < 3 && hessian != HessianKind::none; ++l)
+            addTo<Pack>(blocks.vertex(k, l) + s, -weight * Pack(spin_(k, l)));
         }
       }
     for (const Couple &m : couples_[r]) {
@@ -107,12 +115,13 @@ private:
   Vector3<Pack> accelerationAt(const Vector3<Pack> &x) const {
     Vector3<Pack> a;
     for (int k = 0; k < 3; ++k)
-      a[k] = Pack(spin_(k, 0)) * (x[0] - Pack(centre_[0])) + Pack(spin_(k, 1)) * (x[1] - Pack(centre_[1])) + Pack(spin_(k, 2)) * (x[2] - Pack(centre_[2]));
+      a[k] = Pack(spin_(k, 0)) * (x[0] - Pack(centre_[0])) + Pack(spin_(k, 1)) * (x[1] - Pack(centre_[1])) +
+             Pack(spin_(k, 2)) * (x[2] - Pack(centre_[2]));
     return a;
   }
 
-  /// Symmetric part of the derivative of the gradient of a couple over (e, theta): with g_e = -(M x t)/l and g_theta = -M.t,
-  /// d g_e/d e = -[M]x (I - 2 t t')/l^2 ... symmetrised, d g_theta/d e = -(I - t t') M/l and d g_e/d theta = 0.
+  /// Symmetric part of the derivative of the gradient of a couple over (e, theta): with g_e = -(M x t)/l and g_theta =
+  /// -M.t, d g_e/d e = -[M]x (I - 2 t t')/l^2 ... symmetrised, d g_theta/d e = -(I - t t') M/l and d g_e/d theta = 0.
   static void addCoupleHessian(const Vec3 &moment, const Frame &f, int slot, const BlockPlanes &blocks) {
     const Vec3 &t = f.tangent;
     const double inverse = 1 / f.length;
@@ -127,6 +136,8 @@ private:
 
 } // namespace
 
-std::unique_ptr<Term> makeLoad(const Scene &scene, const Elements &elements) { return std::make_unique<Load>(scene, elements); }
+std::unique_ptr<Term> makeLoad(const Scene &scene, const Elements &elements) {
+  return std::make_unique<Load>(scene, elements);
+}
 
 } // namespace tendril

@@ -4,12 +4,15 @@
 
 namespace tendril {
 
-std::vector<std::unique_ptr<Term>> makeTerms(const Scene &scene, const Elements &elements, const AxialLaw &axial, bool dynamic) {
+std::vector<std::unique_ptr<Term>> makeTerms(const Scene &scene, const Elements &elements, const AxialLaw &axial,
+                                             bool dynamic) {
   std::vector<std::unique_ptr<Term>> terms;
-  const bool heavy = !scene.gravity.isZero(0) && std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &r) { return r.gravity; });
+  const bool heavy = !scene.gravity.isZero(0) &&
+                     std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &r) { return r.gravity; });
   terms.push_back(makeStretch(elements, axial));
   if (!elements.cell_slot.empty()) terms.push_back(makeBendTwist(scene, elements));
-  if (heavy || !scene.rotation.angular_velocity.isZero(0) || !scene.forces.empty() || !scene.moments.empty()) terms.push_back(makeLoad(scene, elements));
+  if (heavy || !scene.rotation.angular_velocity.isZero(0) || !scene.forces.empty() || !scene.moments.empty())
+    terms.push_back(makeLoad(scene, elements));
   if (dynamic) terms.push_back(makeInertia(scene, elements));
   return terms;
 }
@@ -19,25 +22,31 @@ Vec3 momentOn(const Elements &elements, const Planes &cells, const Configuration
   for (const LooseCell &cell : heldCells(elements, rod, frame)) {
     const Frame f0 = c.frameAt(cell.frame0), f1 = c.frameAt(cell.frame1);
     const CellOf<double> k = cellOf<double>(cells, c, cell.slot);
-    const auto gradient = elements.measure[rod] == Measure::tan ? cellGradient<Measure::tan>(f0, f1, k) : cellGradient<Measure::angle>(f0, f1, k);
+    const auto gradient = elements.measure[rod] == Measure::tan ? cellGradient<Measure::tan>(f0, f1, k)
+                                                                : cellGradient<Measure::angle>(f0, f1, k);
     const Vec3 moment = cellMoment(f0, f1, k, gradient);
     sum += cell.frame1 == frame ? moment : Vec3(-moment);
   }
   return sum;
 }
 
-std::array<double, 3> endEnergy(const Elements &elements, const Configuration &c, const EndCouple &end, double load_factor) {
+std::array<double, 3> endEnergy(const Elements &elements, const Configuration &c, const EndCouple &end,
+                                double load_factor) {
   const Frame f = c.frameAt(end.edge);
   const Vec3 moment = load_factor * (end.moment + end.torque * f.tangent);
   // Bending strains are curvatures multiplied by the stretch, moments their derivatives by the curvature.
   double stretch = 1;
-  if (end.cell >= 0) stretch = cellGeometry(c.frameAt(end.cell - 1), c.frameAt(end.cell), readCell<double>(elements.cells(), end.cell)).stretch;
-  const std::array<double, 3> m{moment.dot(f.director) / stretch, moment.dot(f.secondDirector()) / stretch, moment.dot(f.tangent)};
-  return {0.5 * end.compliance[0] * m[0] * m[0], 0.5 * end.compliance[1] * m[1] * m[1], 0.5 * end.compliance[2] * m[2] * m[2]};
+  if (end.cell >= 0)
+    stretch = cellGeometry(c.frameAt(end.cell - 1), c.frameAt(end.cell), readCell<double>(elements.cells(), end.cell))
+                  .stretch;
+  const std::array<double, 3> m{moment.dot(f.director) / stretch, moment.dot(f.secondDirector()) / stretch,
+                                moment.dot(f.tangent)};
+  return {0.5 * end.compliance[0] * m[0] * m[0], 0.5 * end.compliance[1] * m[1] * m[1],
+          0.5 * end.compliance[2] * m[2] * m[2]};
 }
 
-[[gnu::flatten]] EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, const Configuration &c, double load_factor,
-                                           int r) {
+[[gnu::flatten]] EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state,
+                                           const Configuration &c, double load_factor, int r) {
   EnergyBudget budget;
   const RodRange &rod = elements.rods[r];
   double kinetic = 0, gravity = 0;
@@ -48,7 +57,8 @@ std::array<double, 3> endEnergy(const Elements &elements, const Configuration &c
     gravity += mass * scene.gravity.dot(state.position[v]);
   }
   for (int i = 0; i < rod.edges; ++i)
-    kinetic += elements.twistMass()[rod.slot(i)] * state.twist_rate[rod.first_edge + i] * state.twist_rate[rod.first_edge + i];
+    kinetic +=
+        elements.twistMass()[rod.slot(i)] * state.twist_rate[rod.first_edge + i] * state.twist_rate[rod.first_edge + i];
   budget.kinetic = 0.5 * kinetic;
   budget.gravity = scene.rods[r].gravity ? -load_factor * gravity : 0;
   if (!scene.rotation.angular_velocity.isZero(0))
@@ -96,7 +106,8 @@ EnergyBudget &EnergyBudget::operator+=(const EnergyBudget &other) {
   return *this;
 }
 
-EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, const Configuration &c, double load_factor) {
+EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, const Configuration &c,
+                          double load_factor) {
   EnergyBudget budget;
   for (int r = 0; r < int(elements.rods.size()); ++r) budget += energyBudget(scene, elements, state, c, load_factor, r);
   return budget;

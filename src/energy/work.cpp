@@ -20,7 +20,8 @@ double weightPotential(const Scene &scene, const Elements &elements, const Confi
   return sum;
 }
 
-SupportActions staticActions(const Scene &scene, const Elements &elements, const State &state, const std::vector<int> &moving) {
+SupportActions staticActions(const Scene &scene, const Elements &elements, const State &state,
+                             const std::vector<int> &moving) {
   const RodActions actions = rodActions(scene, elements, state, state.time, state.time);
   SupportActions out;
   for (const int s : moving) out.insert(out.end(), {actions.reaction[s], actions.reaction_moment[s]});
@@ -36,21 +37,29 @@ double coupleWork(const Vec3 &moment, double torque, const Vec3 &from, const Vec
   return (torque + moment.dot(mean)) * spin + turning * moment.dot(axis);
 }
 
-double workOfLoads(const Scene &scene, const Elements &elements, const Configuration &start, const Configuration &end, double factor_start, double factor_end) {
+double workOfLoads(const Scene &scene, const Elements &elements, const Configuration &start, const Configuration &end,
+                   double factor_start, double factor_end) {
   const double mean = 0.5 * (factor_start + factor_end);
   double sum = 0;
-  for (const NodalForce &f : scene.forces) sum += mean * f.force.dot(end.displacementAt(elements.rods[f.rod].slot(f.vertex), start));
+  for (const NodalForce &f : scene.forces)
+    sum += mean * f.force.dot(end.displacementAt(elements.rods[f.rod].slot(f.vertex), start));
   for (const EdgeMoment &m : scene.moments) {
     const int slot = elements.rods[m.rod].slot(m.edge);
     const Frame before = start.frameAt(slot), after = end.frameAt(slot);
-    const double principal = halfAngleBetween(before, after).angle(), spun = end[Configuration::spin][slot] - start[Configuration::spin][slot];
-    sum += mean * coupleWork(m.moment, m.torque, before.tangent, after.tangent, principal + 2 * pi * std::round((spun - principal) / (2 * pi)));
+    const double principal = halfAngleBetween(before, after).angle(),
+                 spun = end[Configuration::spin][slot] - start[Configuration::spin][slot];
+    sum += mean * coupleWork(m.moment, m.torque, before.tangent, after.tangent,
+                             principal + 2 * pi * std::round((spun - principal) / (2 * pi)));
   }
-  if (!scene.moments.empty()) // an end couple turns the half edge beyond the last cell, too, and what it does there is stored
+  if (!scene.moments
+           .empty()) // an end couple turns the half edge beyond the last cell, too, and what it does there is stored
     for (const auto &couples : elements.end_couples)
       for (const EndCouple &couple : couples)
-        for (int k = 0; k < 3; ++k) sum += endEnergy(elements, end, couple, factor_end)[k] - endEnergy(elements, start, couple, factor_start)[k];
-  if (factor_end != factor_start) sum += 0.5 * (factor_end - factor_start) * (weightPotential(scene, elements, start) + weightPotential(scene, elements, end));
+        for (int k = 0; k < 3; ++k)
+          sum += endEnergy(elements, end, couple, factor_end)[k] - endEnergy(elements, start, couple, factor_start)[k];
+  if (factor_end != factor_start)
+    sum += 0.5 * (factor_end - factor_start) *
+           (weightPotential(scene, elements, start) + weightPotential(scene, elements, end));
   return sum;
 }
 
@@ -61,19 +70,21 @@ std::vector<int> movingSupports(const Scene &scene) {
   return moving;
 }
 
-double workOfSupports(const Scene &scene, const Elements &elements, const Configuration &start, const Configuration &end, double from, double to,
-                      const SupportActions &actions) {
+double workOfSupports(const Scene &scene, const Elements &elements, const Configuration &start,
+                      const Configuration &end, double from, double to, const SupportActions &actions) {
   double sum = 0;
   std::size_t next = 0;
   for (const int s : movingSupports(scene)) {
     const Support &support = scene.supports[s];
     const Vec3 &force = actions[next++], &moment = actions[next++];
-    sum += force.dot(end.displacementAt(elements.rods[support.rod].slot(support.vertex), start)) + moment.dot(support.motion.turnBetween(from, to));
+    sum += force.dot(end.displacementAt(elements.rods[support.rod].slot(support.vertex), start)) +
+           moment.dot(support.motion.turnBetween(from, to));
   }
   return sum;
 }
 
-Work staticWork(const Scene &scene, const Elements &elements, const State &before, const State &after, const Configuration &start, const Configuration &end) {
+Work staticWork(const Scene &scene, const Elements &elements, const State &before, const State &after,
+                const Configuration &start, const Configuration &end) {
   Work work{workOfLoads(scene, elements, start, end, before.time, after.time), 0};
   const std::vector<int> moving = movingSupports(scene);
   if (moving.empty()) return work;
@@ -85,7 +96,8 @@ Work staticWork(const Scene &scene, const Elements &elements, const State &befor
 }
 
 Work staticWork(const Scene &scene, const Elements &elements, const State &before, const State &after) {
-  return staticWork(scene, elements, before, after, configurationOf(before, scene, elements, before.time), configurationOf(after, scene, elements, after.time));
+  return staticWork(scene, elements, before, after, configurationOf(before, scene, elements, before.time),
+                    configurationOf(after, scene, elements, after.time));
 }
 
 } // namespace tendril

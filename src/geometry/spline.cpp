@@ -26,7 +26,8 @@ std::vector<Vec3> splineSlopes(const std::vector<Vec3> &x) {
     const double lower = i < n ? h[i] : last;
     diagonal[i] = i < n ? 2 * (h[i - 1] + h[i]) : h[n - 2];
     if (i < n) upper[i] = h[i - 1];
-    m[i] = i < n ? Vec3(3 * (h[i] * d[i - 1] + h[i - 1] * d[i])) : Vec3(((h[n - 1] + 2 * last) * h[n - 2] * d[n - 1] + h[n - 1] * h[n - 1] * d[n - 2]) / last);
+    m[i] = i < n ? Vec3(3 * (h[i] * d[i - 1] + h[i - 1] * d[i]))
+                 : Vec3(((h[n - 1] + 2 * last) * h[n - 2] * d[n - 1] + h[n - 1] * h[n - 1] * d[n - 2]) / last);
     const double factor = lower / diagonal[i - 1];
     diagonal[i] -= factor * upper[i - 1];
     m[i] -= factor * m[i - 1];

@@ -19,7 +19,8 @@ constexpr const char *format = "tendril-checkpoint";
 constexpr int version = 3;     ///< 1 had no names, hashes and checksum, 2 no actions of supports
 constexpr int most_memory = 8; ///< more than any integrator remembers
 
-/// Every step is a one-to-one map of the sum, so that no single change of what is added leaves it as it was (after FNV-1a by words).
+/// Every step is a one-to-one map of the sum, so that no single change of what is added leaves it as it was (after
+/// FNV-1a by words).
 class Digest {
 public:
   void add(const void *data, std::size_t bytes) {
@@ -60,16 +61,21 @@ std::string textOf(double x) {
 std::string textOf(const Vec3 &x) { return "[" + textOf(x[0]) + ", " + textOf(x[1]) + ", " + textOf(x[2]) + "]"; }
 
 std::string textOf(const Material &m) {
-  return "linear_density " + textOf(m.linear_density) + ", linear_rotational_inertia " + textOf(m.linear_rotational_inertia) + ", axial_stiffness " +
-         textOf(m.axial_stiffness) + ", torsional_stiffness " + textOf(m.torsional_stiffness) + ", flexural_stiffness [" + textOf(m.flexural_stiffness[0]) +
-         ", " + textOf(m.flexural_stiffness[1]) + "], damping " + textOf(m.mass_damping_coefficient) + " and " + textOf(m.stiffness_damping_coefficient);
+  return "linear_density " + textOf(m.linear_density) + ", linear_rotational_inertia " +
+         textOf(m.linear_rotational_inertia) + ", axial_stiffness " + textOf(m.axial_stiffness) +
+         ", torsional_stiffness " + textOf(m.torsional_stiffness) + ", flexural_stiffness [" +
+         textOf(m.flexural_stiffness[0]) + ", " + textOf(m.flexural_stiffness[1]) + "], damping " +
+         textOf(m.mass_damping_coefficient) + " and " + textOf(m.stiffness_damping_coefficient);
 }
 
 std::string textOf(const Support &support) {
   std::string text = nameOf(support.kind);
-  if (support.holdsTwist()) text += " of tangent " + textOf(support.frame.tangent) + " and director " + textOf(support.frame.director);
+  if (support.holdsTwist())
+    text += " of tangent " + textOf(support.frame.tangent) + " and director " + textOf(support.frame.director);
   const Motion &m = support.motion;
-  if (m.table.empty()) return m.moves() ? text + ", velocity " + textOf(m.velocity) + ", angular velocity " + textOf(m.angular_velocity) : text;
+  if (m.table.empty())
+    return m.moves() ? text + ", velocity " + textOf(m.velocity) + ", angular velocity " + textOf(m.angular_velocity)
+                     : text;
   std::string table;
   for (const Motion::Key &k : m.table) table += textOf(k.time) + textOf(k.displacement) + textOf(k.rotation);
   return text + ", motion by a table of " + std::to_string(m.table.size()) + " rows, #" + hashOf(table);
@@ -124,7 +130,9 @@ public:
     std::error_code none;
     bytes_ = std::filesystem::file_size(path, none);
   }
-  [[noreturn]] void fail(const std::string &what) const { throw DamagedCheckpoint(path_ + ": " + what + "; take another checkpoint"); }
+  [[noreturn]] void fail(const std::string &what) const {
+    throw DamagedCheckpoint(path_ + ": " + what + "; take another checkpoint");
+  }
   void number(const char *name, double &value) {
     const std::optional<double> read = file_.number(name);
     if (!read) fail(std::string("has no number '") + name + "'");
@@ -136,7 +144,8 @@ public:
   std::size_t count(const char *name, double most) {
     double value;
     number(name, value);
-    if (!(value >= 0 && value <= most && value == std::floor(value))) fail(std::string("'") + name + "' is " + textOf(value));
+    if (!(value >= 0 && value <= most && value == std::floor(value)))
+      fail(std::string("'") + name + "' is " + textOf(value));
     return std::size_t(value);
   }
   void text(const char *name, std::string &value) {
@@ -174,13 +183,16 @@ private:
   std::uintmax_t bytes_ = 0;
 };
 
-/// Where each cell of a scene is: four times the vertex, plus 0 for the cell between two edges, 1 from an edge to a support and 2 from a support to an edge.
+/// Where each cell of a scene is: four times the vertex, plus 0 for the cell between two edges, 1 from an edge to a
+/// support and 2 from a support to an edge.
 std::vector<double> cellPlaces(const Elements &elements) {
   std::vector<double> places;
   for (int r = 0; r < int(elements.rods.size()); ++r) {
     const RodRange &rod = elements.rods[r];
     for (const LooseCell &cell : cellsOf(elements, r)) {
-      const int v = cell.vertex - rod.first_slot, side = edgeAt(rod, cell.frame1) < 0 ? 1 : edgeAt(rod, cell.frame0) < 0 ? 2 : 0;
+      const int v = cell.vertex - rod.first_slot, side = edgeAt(rod, cell.frame1) < 0   ? 1
+                                                         : edgeAt(rod, cell.frame0) < 0 ? 2
+                                                                                        : 0;
       places.push_back(4.0 * (rod.first_vertex + (v == rod.vertices ? 0 : v)) + side);
     }
   }
@@ -195,7 +207,9 @@ std::vector<double> cellTwists(const Simulation &run, const State &state) {
   return twists;
 }
 
-bool countsTurns(const Elements &elements) { return std::find(elements.measure.begin(), elements.measure.end(), Measure::angle) != elements.measure.end(); }
+bool countsTurns(const Elements &elements) {
+  return std::find(elements.measure.begin(), elements.measure.end(), Measure::angle) != elements.measure.end();
+}
 
 /// What is in the file besides the facts of the run: one list for writing and reading.
 struct Contents {
@@ -267,7 +281,8 @@ using Values = std::map<std::pair<std::string, std::string>, std::string>; ///< 
 Values valuesOf(const std::string &text) {
   Values values;
   for (std::size_t at = 0; at < text.size();) {
-    const std::size_t end = std::min(text.find('\n', at), text.size()), tab = text.find('\t', at), second = text.find('\t', tab + 1);
+    const std::size_t end = std::min(text.find('\n', at), text.size()), tab = text.find('\t', at),
+                      second = text.find('\t', tab + 1);
     if (tab < end && second < end) {
       std::string &value = values[{text.substr(at, tab - at), text.substr(tab + 1, second - tab - 1)}];
       value += (value.empty() ? "" : " and ") + text.substr(second + 1, end - second - 1);
@@ -290,11 +305,12 @@ int compare(const Values &before, const Values &now, bool options, std::vector<s
     if (!gone && !added && old->second == present->second) continue;
     if (key.first == kinds[int(Kind::option)] && (!options || gone || added)) continue; // an option of another method
     if (key.first == kinds[int(Kind::start)]) {
-      lines.push_back("changed since the checkpoint, but only for the start, so that it is ignored: " + key.second + ": " + (added ? "none" : old->second) +
-                      " -> " + (gone ? "none" : present->second));
+      lines.push_back("changed since the checkpoint, but only for the start, so that it is ignored: " + key.second +
+                      ": " + (added ? "none" : old->second) + " -> " + (gone ? "none" : present->second));
       continue;
     }
-    if (added && (key.second == order_of_rods || key.second == names_of_rods)) continue; // earlier versions did not keep it
+    if (added && (key.second == order_of_rods || key.second == names_of_rods))
+      continue; // earlier versions did not keep it
     for (int k = 0; k < 3; ++k)
       if (key.first == kinds[k]) kind = std::max(kind, k);
     const bool is_long = any.find('#') != std::string::npos;
@@ -302,14 +318,16 @@ int compare(const Values &before, const Values &now, bool options, std::vector<s
     lines.push_back(gone      ? "no longer there: " + key.second + value
                     : added   ? "new since the checkpoint: " + key.second + value
                     : is_long ? "changed since the checkpoint: " + key.second
-                              : "changed since the checkpoint: " + key.second + ": " + old->second + " -> " + present->second);
+                              : "changed since the checkpoint: " + key.second + ": " + old->second + " -> " +
+                                    present->second);
   }
   for (std::size_t k = 0; k < lines.size() && k < most; ++k) told->push_back(lines[k]);
   if (lines.size() > most) told->push_back("... and " + std::to_string(lines.size() - most) + " more changes");
   return kind;
 }
 
-/// Whole turns of cells that were others in the checkpoint: the twist of a vertex along the rod stays what it was, by whole cell or halves.
+/// Whole turns of cells that were others in the checkpoint: the twist of a vertex along the rod stays what it was, by
+/// whole cell or halves.
 void carryTurns(const Simulation &run, const Contents &old, const std::vector<double> &places, State *state) {
   state->turns.assign(places.size(), 0.0);
   if (!countsTurns(*run.elements) || old.twists.size() != old.cells.size()) return;
@@ -329,15 +347,17 @@ void carryTurns(const Simulation &run, const Contents &old, const std::vector<do
   }
 }
 
-/// After a change of the scene: axial forces are those of the strains, held vertices move with their supports, no method remembers anything, and
-/// measure tan knows no whole turns.
+/// After a change of the scene: axial forces are those of the strains, held vertices move with their supports, no
+/// method remembers anything, and measure tan knows no whole turns.
 void beginAnew(const Simulation &run, State *state, std::vector<std::string> *told) {
   for (std::size_t r = 0; r < run.elements->rods.size(); ++r) {
     if (run.elements->measure[r] == Measure::angle) continue;
-    const auto begin = state->turns.begin() + run.elements->rod_cells[r], end = state->turns.begin() + run.elements->rod_cells[r + 1];
+    const auto begin = state->turns.begin() + run.elements->rod_cells[r],
+               end = state->turns.begin() + run.elements->rod_cells[r + 1];
     if (std::all_of(begin, end, [](double turns) { return turns == 0; })) continue;
     std::fill(begin, end, 0.0);
-    told->push_back("warning: rod '" + inOneLine(run.scene.rods[r].name) + "' loses its whole turns of twist, which measure tan does not count");
+    told->push_back("warning: rod '" + inOneLine(run.scene.rods[r].name) +
+                    "' loses its whole turns of twist, which measure tan does not count");
   }
   state->memory.clear();
   state->strains.clear();
@@ -347,10 +367,13 @@ void beginAnew(const Simulation &run, State *state, std::vector<std::string> *to
   for (std::size_t r = 0; r < run.elements->rods.size(); ++r) {
     const RodRange &rod = run.elements->rods[r];
     for (int i = 0; i < rod.edges; ++i)
-      state->axial_force[rod.first_edge + i] = run.scene.rods[r].material.axial_stiffness * c[Configuration::strain][rod.slot(i)];
+      state->axial_force[rod.first_edge + i] =
+          run.scene.rods[r].material.axial_stiffness * c[Configuration::strain][rod.slot(i)];
   }
   for (const Support &s : run.scene.supports)
-    if (s.holdsPosition()) state->velocity[run.elements->rods[s.rod].first_vertex + s.vertex] = run.dynamic ? s.motion.velocityAt(state->time) : Vec3::Zero();
+    if (s.holdsPosition())
+      state->velocity[run.elements->rods[s.rod].first_vertex + s.vertex] =
+          run.dynamic ? s.motion.velocityAt(state->time) : Vec3::Zero();
 }
 
 /// Supports that the vertex they hold is not at: the first step would move it there.
@@ -362,8 +385,8 @@ void tellJumps(const Simulation &run, const State &state, std::vector<std::strin
     const double off = (state.position[run.elements->rods[s.rod].first_vertex + s.vertex] - place).norm();
     if (off <= 1e-6 * dimensionlessGroups(rod, run.scene.gravity).length) continue;
     std::ostringstream line;
-    line << "warning: the support at vertex " << s.vertex << " of rod '" << inOneLine(rod.name) << "' is " << std::setprecision(3) << off
-         << " m from where the checkpoint has the vertex: the first step moves it there";
+    line << "warning: the support at vertex " << s.vertex << " of rod '" << inOneLine(rod.name) << "' is "
+         << std::setprecision(3) << off << " m from where the checkpoint has the vertex: the first step moves it there";
     told->push_back(line.str());
   }
 }
@@ -374,7 +397,8 @@ struct OtherRun : SceneError {
 };
 
 /// Files of version 1: numbers without names in `loop`.
-void readArrays1(const std::string &path, const Hdf5File &file, const Elements &elements, const std::string &integrator, Contents *c) {
+void readArrays1(const std::string &path, const Hdf5File &file, const Elements &elements, const std::string &integrator,
+                 Contents *c) {
   State &s = c->state;
   auto array = [&](const std::string &name, auto &values, std::size_t rows) {
     using T = std::decay_t<decltype(values[0])>;
@@ -400,7 +424,8 @@ void readArrays1(const std::string &path, const Hdf5File &file, const Elements &
   s.step = std::int64_t(loop[1]);
   c->control = {loop[2], int(loop[3]), loop[4] != 0, loop[5], loop[6], loop[9]};
   double code = 0; // a number that stood for the name of an integrator
-  for (const char letter : integrator == "statics" ? std::string("euler") : integrator) code = std::fmod(31 * code + letter, 1e9 + 7);
+  for (const char letter : integrator == "statics" ? std::string("euler") : integrator)
+    code = std::fmod(31 * code + letter, 1e9 + 7);
   if (loop[8] != code) return;
   s.last_dt = loop[7];
   if (loop.size() > 10) s.dt_before = loop[10];
@@ -417,8 +442,11 @@ void readArrays1(const std::string &path, const Hdf5File &file, const Elements &
 } // namespace
 
 RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::string &text)
-    : dynamic(settings.dynamic), integrator(settings.dynamic ? settings.integrator.name : "statics"), dt(settings.dt), scene_hash(hashOf(text)) {
-  auto add = [&](Kind kind, const std::string &name, const std::string &value) { facts.push_back({kind, inOneLine(name), inOneLine(value)}); };
+    : dynamic(settings.dynamic), integrator(settings.dynamic ? settings.integrator.name : "statics"), dt(settings.dt),
+      scene_hash(hashOf(text)) {
+  auto add = [&](Kind kind, const std::string &name, const std::string &value) {
+    facts.push_back({kind, inOneLine(name), inOneLine(value)});
+  };
   auto option = [&](const char *name, const auto &value) {
     if constexpr (std::is_convertible_v<decltype(value), std::string>)
       add(Kind::option, name, value);
@@ -442,7 +470,9 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
   option("stretch", settings.mixed ? "mixed" : "primal");
   option("retraction", settings.solve.retraction == RetractionKind::length ? "length" : "additive");
   option("hessian", settings.hessian == HessianKind::exact ? "exact" : "gauss_newton");
-  option("line_search", settings.solve.line_search == LineSearchKind::energy ? "energy" : settings.solve.line_search == LineSearchKind::wolfe ? "wolfe" : "residual");
+  option("line_search", settings.solve.line_search == LineSearchKind::energy  ? "energy"
+                        : settings.solve.line_search == LineSearchKind::wolfe ? "wolfe"
+                                                                              : "residual");
   option("quasi_newton", settings.solve.quasi_newton);
   option("rounding_tolerance", settings.solve.rounding_tolerance);
 
@@ -462,7 +492,8 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
     const std::string of = " of rod '" + rod.name + "'";
     add(Kind::scene, "material" + of, textOf(rod.material));
     add(Kind::scene, "law" + of,
-        std::string(rod.measure == Measure::tan ? "measure tan" : "measure angle") + (rod.energy == Energy::seed ? ", energy seed" : ", energy classical") +
+        std::string(rod.measure == Measure::tan ? "measure tan" : "measure angle") +
+            (rod.energy == Energy::seed ? ", energy seed" : ", energy classical") +
             (rod.gravity ? "" : ", without gravity"));
     Digest shape;
     shape.add(rod.position.data(), rod.position.size() * sizeof(Vec3));
@@ -475,7 +506,9 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
   for (const std::string &name : names) set.add(name + "\n");
   add(Kind::scene, order_of_rods, "#" + order.hex());
   add(Kind::scene, names_of_rods, "#" + set.hex());
-  auto at = [&](const char *what, int place, int rod) { return std::string(what) + std::to_string(place) + " of rod '" + scene.rods[rod].name + "'"; };
+  auto at = [&](const char *what, int place, int rod) {
+    return std::string(what) + std::to_string(place) + " of rod '" + scene.rods[rod].name + "'";
+  };
   for (const Support &s : scene.supports) add(Kind::scene, at("support at vertex ", s.vertex, s.rod), textOf(s));
   for (const NodalForce &f : scene.forces) add(Kind::load, at("force on vertex ", f.vertex, f.rod), textOf(f.force));
   for (const EdgeMoment &m : scene.moments) {
@@ -484,7 +517,8 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
   }
 }
 
-void writeCheckpoint(const std::string &path, const Simulation &run, const StepControl &control, const RunFacts &facts) {
+void writeCheckpoint(const std::string &path, const Simulation &run, const StepControl &control,
+                     const RunFacts &facts) {
   const std::string part = path + ".part";
   std::error_code error;
   try {
@@ -496,12 +530,14 @@ void writeCheckpoint(const std::string &path, const Simulation &run, const StepC
     out.number("dt", facts.dt);
     out.text("topology_hash", facts.topology_hash);
     out.text("scene_hash", facts.scene_hash);
-    for (const auto &[name, n] : {std::pair{"rods", int(run.scene.rods.size())}, {"vertices", run.elements->vertices()}, {"edges", run.elements->edges()}})
+    for (const auto &[name, n] : {std::pair{"rods", int(run.scene.rods.size())},
+                                  {"vertices", run.elements->vertices()},
+                                  {"edges", run.elements->edges()}})
       out.number(name, n);
     out.longText("facts", joined(facts.facts));
     const bool turns = countsTurns(*run.elements);
-    const Contents contents{run.state, control, cellPlaces(*run.elements), turns ? cellTwists(run, run.state) : std::vector<double>(),
-                            strainRow(*run.elements)};
+    const Contents contents{run.state, control, cellPlaces(*run.elements),
+                            turns ? cellTwists(run, run.state) : std::vector<double>(), strainRow(*run.elements)};
     exchange(out, contents, *run.elements);
     out.finish();
   } catch (const SceneError &) {
@@ -512,7 +548,8 @@ void writeCheckpoint(const std::string &path, const Simulation &run, const StepC
   if (error) throw WriteError(path + ": cannot be written");
 }
 
-bool readCheckpoint(const std::string &path, Simulation *run, StepControl *control, const RunFacts &facts, std::vector<std::string> *told) {
+bool readCheckpoint(const std::string &path, Simulation *run, StepControl *control, const RunFacts &facts,
+                    std::vector<std::string> *told) {
   const Elements &elements = *run->elements;
   Contents c;
   std::vector<std::string> lines;
@@ -523,7 +560,8 @@ bool readCheckpoint(const std::string &path, Simulation *run, StepControl *contr
     const Hdf5File file = Hdf5File::open(path);
     if (!file.text("format") && file.has("loop")) {
       readArrays1(path, file, elements, facts.integrator, &c);
-      lines.push_back(path + ": is of an earlier version, without checksum and without the scene it is of: that of this run has to be the same");
+      lines.push_back(path + ": is of an earlier version, without checksum and without the scene it is of: that of "
+                             "this run has to be the same");
     } else {
       Reader in(path, file);
       std::string read, mode, integrator, scene_hash, topology_hash, text;
@@ -531,30 +569,37 @@ bool readCheckpoint(const std::string &path, Simulation *run, StepControl *contr
       if (read != format) in.fail("is no checkpoint");
       in.format_version = in.count("format_version", 1e9);
       if (in.format_version < 2 || in.format_version > version)
-        throw OtherRun(path + ": is of format " + std::to_string(in.format_version) + ", and this version reads formats 1 to " + std::to_string(version) +
-                       "; take a newer one");
+        throw OtherRun(path + ": is of format " + std::to_string(in.format_version) +
+                       ", and this version reads formats 1 to " + std::to_string(version) + "; take a newer one");
       in.text("mode", mode);
       in.text("integrator", integrator);
       double dt;
       in.number("dt", dt);
       in.text("topology_hash", topology_hash);
       in.text("scene_hash", scene_hash);
-      const std::size_t rods = in.count("rods", 1e12), vertices = in.count("vertices", 1e12), edges = in.count("edges", 1e12);
-      if (topology_hash != facts.topology_hash || vertices != std::size_t(elements.vertices()) || edges != std::size_t(elements.edges()))
-        throw OtherRun(path + ": is of another topology, " + std::to_string(rods) + " rods with " + std::to_string(vertices) + " vertices and " +
-                       std::to_string(edges) + " edges, and the scene has " + std::to_string(run->scene.rods.size()) + " with " +
+      const std::size_t rods = in.count("rods", 1e12), vertices = in.count("vertices", 1e12),
+                        edges = in.count("edges", 1e12);
+      if (topology_hash != facts.topology_hash || vertices != std::size_t(elements.vertices()) ||
+          edges != std::size_t(elements.edges()))
+        throw OtherRun(path + ": is of another topology, " + std::to_string(rods) + " rods with " +
+                       std::to_string(vertices) + " vertices and " + std::to_string(edges) +
+                       " edges, and the scene has " + std::to_string(run->scene.rods.size()) + " with " +
                        std::to_string(elements.vertices()) + " and " + std::to_string(elements.edges()) +
-                       "; restart with the scene that wrote the checkpoint, or one that only changes loads, supports, materials and options");
+                       "; restart with the scene that wrote the checkpoint, or one that only changes loads, supports, "
+                       "materials and options");
       in.longText("facts", text);
       exchange(in, c, elements);
       if (!in.finish()) lines.push_back(path + ": has no checksum: its data are taken as they are");
       switches = mode != (facts.dynamic ? "dynamic" : "static");
       const Values old = valuesOf(text), now = valuesOf(joined(facts.facts));
-      const std::pair<std::string, std::string> order{kinds[int(Kind::scene)], order_of_rods}, names{kinds[int(Kind::scene)], names_of_rods};
+      const std::pair<std::string, std::string> order{kinds[int(Kind::scene)], order_of_rods},
+          names{kinds[int(Kind::scene)], names_of_rods};
       if (old.count(order) && old.at(order) != now.at(order) && old.at(names) == now.at(names))
-        throw OtherRun(path + ": has the same rods in another order; write them in the scene in the order of the checkpoint");
+        throw OtherRun(path +
+                       ": has the same rods in another order; write them in the scene in the order of the checkpoint");
       const std::pair<std::string, std::string> adapt{kinds[int(Kind::option)], "dt_adapt"};
-      same_dt = dt == facts.dt && old.count(adapt) == now.count(adapt) && (!now.count(adapt) || old.at(adapt) == now.at(adapt));
+      same_dt = dt == facts.dt && old.count(adapt) == now.count(adapt) &&
+                (!now.count(adapt) || old.at(adapt) == now.at(adapt));
       same_method = integrator == facts.integrator && c.strain_row == strainRow(elements);
       const std::size_t before = lines.size();
       other = compare(old, now, !switches, &lines);
@@ -568,7 +613,8 @@ bool readCheckpoint(const std::string &path, Simulation *run, StepControl *contr
   } catch (const SceneError &e) {
     throw DamagedCheckpoint(e.what());
   }
-  if (!std::isfinite(c.state.time) || !(c.state.time >= 0) || !std::isfinite(c.control.dt)) throw DamagedCheckpoint(path + ": its time or step is no number");
+  if (!std::isfinite(c.state.time) || !(c.state.time >= 0) || !std::isfinite(c.control.dt))
+    throw DamagedCheckpoint(path + ": its time or step is no number");
   State &s = c.state;
   const bool other_cells = !c.cells.empty() && c.cells != places;
   if (c.cells.empty() && s.turns.size() != places.size()) s.turns.assign(places.size(), 0.0);

@@ -19,7 +19,8 @@ void writeEstimate(const std::string &path, const Estimate &e) {
   const RodEstimate &worst = e.rods[e.worstRod()];
   file.writeAttribute("estimate", "position_error", worst.error);
   file.writeAttribute("estimate", "relative_position_error", worst.error / worst.length);
-  for (const auto &[name, member] : estimated_energies) file.writeAttribute("estimate", std::string(name) + "_energy_error", std::abs(e.energy_error.*member));
+  for (const auto &[name, member] : estimated_energies)
+    file.writeAttribute("estimate", std::string(name) + "_energy_error", std::abs(e.energy_error.*member));
 }
 
 void writeTimeError(const std::string &path, double error) {

@@ -30,7 +30,8 @@ template <class Open> hid_t patiently(Open open) {
 
 /// An attribute, new or there already: a file that is appended to takes other values, but nothing new.
 hid_t attributeOf(hid_t to, const std::string &name, hid_t type, hid_t space) {
-  return H5Aexists(to, name.c_str()) > 0 ? H5Aopen(to, name.c_str(), H5P_DEFAULT) : H5Acreate2(to, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT);
+  return H5Aexists(to, name.c_str()) > 0 ? H5Aopen(to, name.c_str(), H5P_DEFAULT)
+                                         : H5Acreate2(to, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT);
 }
 
 void attach(hid_t to, const std::string &name, const std::string &value) {
@@ -54,8 +55,12 @@ template <class Number> void attachScalar(hid_t to, const std::string &name, Num
   const Hdf5Attribute a = attributeOf(to, name, stored, space);
   written(H5Awrite(a, native, &value), write_failed);
 }
-void attach(hid_t to, const std::string &name, double value) { attachScalar(to, name, value, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE); }
-void attach(hid_t to, const std::string &name, int value) { attachScalar(to, name, value, H5T_STD_I32LE, H5T_NATIVE_INT); }
+void attach(hid_t to, const std::string &name, double value) {
+  attachScalar(to, name, value, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE);
+}
+void attach(hid_t to, const std::string &name, int value) {
+  attachScalar(to, name, value, H5T_STD_I32LE, H5T_NATIVE_INT);
+}
 
 } // namespace
 
@@ -81,36 +86,44 @@ Hdf5File Hdf5File::create(const std::string &path) {
 Hdf5File Hdf5File::reopen(const std::string &path) {
   Hdf5File f;
   f.path_ = path;
-  f.file_ =
-      checked(patiently([&] { return H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT); }), path + ": cannot be opened again; is another program using it?");
+  f.file_ = checked(patiently([&] { return H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT); }),
+                    path + ": cannot be opened again; is another program using it?");
   return f;
 }
 
-void Hdf5File::startAppending() { written(H5Fstart_swmr_write(file_), path_ + ": cannot be written; is the disk full?"); }
+void Hdf5File::startAppending() {
+  written(H5Fstart_swmr_write(file_), path_ + ": cannot be written; is the disk full?");
+}
 
 bool Hdf5File::has(const std::string &name) const { return H5Lexists(file_, name.c_str(), H5P_DEFAULT) > 0; }
 
 std::vector<double> Hdf5File::read(const std::string &name, hsize_t columns, std::optional<hsize_t> rows) const {
   if (!has(name)) throw SceneError(path_ + ": has no dataset '" + name + "'");
-  const Hdf5Dataset data = checked(H5Dopen2(file_, name.c_str(), H5P_DEFAULT), path_ + ": '" + name + "' is not a dataset");
+  const Hdf5Dataset data =
+      checked(H5Dopen2(file_, name.c_str(), H5P_DEFAULT), path_ + ": '" + name + "' is not a dataset");
   const Hdf5Space space = H5Dget_space(data);
   const int rank = H5Sget_simple_extent_ndims(space);
   std::vector<hsize_t> shape(std::max(rank, 1), 1);
   if (rank > 0) H5Sget_simple_extent_dims(space, shape.data(), nullptr);
   const bool fits = columns == 1 ? rank == 1 : rank == 2 && shape.back() == columns;
-  if (!fits) throw SceneError(path_ + ": dataset '" + name + "' must have " + (columns == 1 ? "one dimension" : "shape (n, " + std::to_string(columns) + ")"));
+  if (!fits)
+    throw SceneError(path_ + ": dataset '" + name + "' must have " +
+                     (columns == 1 ? "one dimension" : "shape (n, " + std::to_string(columns) + ")"));
   if (rows && shape[0] != *rows)
-    throw SceneError(path_ + ": '" + name + "' has " + std::to_string(shape[0]) + " entries, where it takes " + std::to_string(*rows));
+    throw SceneError(path_ + ": '" + name + "' has " + std::to_string(shape[0]) + " entries, where it takes " +
+                     std::to_string(*rows));
   // Rows that were declared but never written would be zeros. Compressed, a byte stands for a thousand at most.
   constexpr hsize_t most_rows = 50'000'000, most_compressed = 1100;
   if (shape[0] > most_rows)
-    throw SceneError(path_ + ": dataset '" + name + "' declares " + std::to_string(shape[0]) + " rows, at most " + std::to_string(most_rows) + " are read");
+    throw SceneError(path_ + ": dataset '" + name + "' declares " + std::to_string(shape[0]) + " rows, at most " +
+                     std::to_string(most_rows) + " are read");
   const hsize_t values_count = shape[0] * columns, stored = H5Dget_storage_size(data);
   if (values_count / most_compressed > stored)
-    throw SceneError(path_ + ": dataset '" + name + "' declares " + std::to_string(shape[0]) + " rows, but the file holds only " + std::to_string(stored) +
-                     " bytes of them");
+    throw SceneError(path_ + ": dataset '" + name + "' declares " + std::to_string(shape[0]) +
+                     " rows, but the file holds only " + std::to_string(stored) + " bytes of them");
   std::vector<double> values(values_count);
-  checked(H5Dread(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), path_ + ": '" + name + "' does not hold numbers");
+  checked(H5Dread(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()),
+          path_ + ": '" + name + "' does not hold numbers");
   for (const double v : values)
     if (!std::isfinite(v)) throw SceneError(path_ + ": dataset '" + name + "' holds a number that is not finite");
   return values;
@@ -118,11 +131,13 @@ std::vector<double> Hdf5File::read(const std::string &name, hsize_t columns, std
 
 std::string Hdf5File::readText(const std::string &name, std::size_t most) const {
   if (!has(name)) throw SceneError(path_ + ": has no dataset '" + name + "'");
-  const Hdf5Dataset data = checked(H5Dopen2(file_, name.c_str(), H5P_DEFAULT), path_ + ": '" + name + "' is not a dataset");
+  const Hdf5Dataset data =
+      checked(H5Dopen2(file_, name.c_str(), H5P_DEFAULT), path_ + ": '" + name + "' is not a dataset");
   const Hdf5Type type = H5Dget_type(data);
   const Hdf5Space space = H5Dget_space(data);
   const std::string no_text = path_ + ": '" + name + "' is not a text";
-  if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) > 0 || H5Sget_simple_extent_npoints(space) != 1 || H5Tget_size(type) > most)
+  if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) > 0 || H5Sget_simple_extent_npoints(space) != 1 ||
+      H5Tget_size(type) > most)
     throw SceneError(no_text);
   std::string value(H5Tget_size(type), '\0');
   checked(H5Dread(data, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, value.data()), no_text);
@@ -165,22 +180,28 @@ void Hdf5File::close() {
 }
 
 void Hdf5File::createGroup(const std::string &name) {
-  Hdf5Group(written(H5Gcreate2(file_, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written; is the disk full?"));
+  Hdf5Group(written(H5Gcreate2(file_, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                    path_ + ": cannot be written; is the disk full?"));
 }
 
-void Hdf5File::write(const std::string &name, const std::vector<hsize_t> &shape, const double *values, const std::string &unit) {
+void Hdf5File::write(const std::string &name, const std::vector<hsize_t> &shape, const double *values,
+                     const std::string &unit) {
   const Hdf5Space space = H5Screate_simple(int(shape.size()), shape.data(), nullptr);
   const Hdf5Dataset data =
-      written(H5Dcreate2(file_, name.c_str(), H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written; is the disk full?");
-  written(H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), path_ + ": cannot be written; is the disk full?");
+      written(H5Dcreate2(file_, name.c_str(), H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+              path_ + ": cannot be written; is the disk full?");
+  written(H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values),
+          path_ + ": cannot be written; is the disk full?");
   if (!unit.empty()) attach(data, "unit", unit);
 }
 
 void Hdf5File::write(const std::string &name, const std::vector<hsize_t> &shape, const int *values) {
   const Hdf5Space space = H5Screate_simple(int(shape.size()), shape.data(), nullptr);
   const Hdf5Dataset data =
-      written(H5Dcreate2(file_, name.c_str(), H5T_STD_I32LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written; is the disk full?");
-  written(H5Dwrite(data, H5T_NATIVE_INT, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), path_ + ": cannot be written; is the disk full?");
+      written(H5Dcreate2(file_, name.c_str(), H5T_STD_I32LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+              path_ + ": cannot be written; is the disk full?");
+  written(H5Dwrite(data, H5T_NATIVE_INT, H5S_ALL, H5S_ALL, H5P_DEFAULT, values),
+          path_ + ": cannot be written; is the disk full?");
 }
 
 void Hdf5File::write(const std::string &name, const std::vector<std::string> &values) {
@@ -201,26 +222,38 @@ void Hdf5File::writeStrings(const std::string &name, hid_t space, std::size_t wi
   H5Tset_size(type, width);
   H5Tset_cset(type, H5T_CSET_UTF8);
   H5Tset_strpad(type, H5T_STR_NULLPAD);
-  const Hdf5Dataset data =
-      written(H5Dcreate2(file_, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), path_ + ": cannot be written; is the disk full?");
-  written(H5Dwrite(data, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), path_ + ": cannot be written; is the disk full?");
+  const Hdf5Dataset data = written(H5Dcreate2(file_, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                                   path_ + ": cannot be written; is the disk full?");
+  written(H5Dwrite(data, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values),
+          path_ + ": cannot be written; is the disk full?");
 }
 
 void Hdf5File::writeAttribute(const std::string &name, const std::string &value) { attach(file_, name, value); }
-void Hdf5File::writeAttribute(const std::string &name, const std::vector<double> &values) { attach(file_, name, values); }
+void Hdf5File::writeAttribute(const std::string &name, const std::vector<double> &values) {
+  attach(file_, name, values);
+}
 void Hdf5File::writeAttribute(const std::string &name, int value) { attach(file_, name, value); }
 void Hdf5File::writeAttribute(const std::string &name, double value) { attach(file_, name, value); }
 
-void Hdf5File::writeAttribute(const std::string &object, const std::string &name, const std::string &value) { attach(objectAt(object), name, value); }
-void Hdf5File::writeAttribute(const std::string &object, const std::string &name, double value) { attach(objectAt(object), name, value); }
-void Hdf5File::writeAttribute(const std::string &object, const std::string &name, int value) { attach(objectAt(object), name, value); }
-void Hdf5File::writeAttribute(const std::string &object, const std::string &name, const std::vector<double> &values) { attach(objectAt(object), name, values); }
+void Hdf5File::writeAttribute(const std::string &object, const std::string &name, const std::string &value) {
+  attach(objectAt(object), name, value);
+}
+void Hdf5File::writeAttribute(const std::string &object, const std::string &name, double value) {
+  attach(objectAt(object), name, value);
+}
+void Hdf5File::writeAttribute(const std::string &object, const std::string &name, int value) {
+  attach(objectAt(object), name, value);
+}
+void Hdf5File::writeAttribute(const std::string &object, const std::string &name, const std::vector<double> &values) {
+  attach(objectAt(object), name, values);
+}
 
 Hdf5Object Hdf5File::objectAt(const std::string &name) const {
   return checked(H5Oopen(file_, name.c_str(), H5P_DEFAULT), path_ + ": has nothing of the name '" + name + "'");
 }
 
-Hdf5Series::Hdf5Series(const Hdf5File &file, const std::string &name, const std::vector<hsize_t> &slab, bool integer) : extent_(slab) {
+Hdf5Series::Hdf5Series(const Hdf5File &file, const std::string &name, const std::vector<hsize_t> &slab, bool integer)
+    : extent_(slab) {
   extent_.insert(extent_.begin(), 0);
   std::vector<hsize_t> most = extent_, chunk = extent_;
   for (const hsize_t n : slab) slab_size_ *= n;
@@ -229,11 +262,14 @@ Hdf5Series::Hdf5Series(const Hdf5File &file, const std::string &name, const std:
   const Hdf5Space space = H5Screate_simple(int(extent_.size()), extent_.data(), most.data());
   const Hdf5Properties create = H5Pcreate(H5P_DATASET_CREATE);
   H5Pset_chunk(create, int(chunk.size()), chunk.data());
-  H5Pset_fill_time(create, H5D_FILL_TIME_NEVER); // all of the extent is written; without this, large chunks pass through memory twice
+  H5Pset_fill_time(
+      create,
+      H5D_FILL_TIME_NEVER); // all of the extent is written; without this, large chunks pass through memory twice
   const Hdf5Properties access = H5Pcreate(H5P_DATASET_ACCESS);
   if (isLarge()) H5Pset_chunk_cache(access, 0, 0, 1); // no cache: to the file from where the values are
   const hid_t type = integer ? H5T_STD_I64LE : H5T_IEEE_F64LE;
-  dataset_ = written(H5Dcreate2(file.id(), name.c_str(), type, space, H5P_DEFAULT, create, access), "dataset " + name + " cannot be created");
+  dataset_ = written(H5Dcreate2(file.id(), name.c_str(), type, space, H5P_DEFAULT, create, access),
+                     "dataset " + name + " cannot be created");
 }
 
 bool Hdf5Series::isLarge() const { return slab_size_ * sizeof(double) >= direct_bytes; }
@@ -257,7 +293,8 @@ void Hdf5Series::write(const double *values, hsize_t slabs) {
   count[0] = slabs;
   extent_[0] += slabs;
   written(H5Dset_extent(dataset_, extent_.data()), write_failed);
-  const Hdf5Space file_space = H5Dget_space(dataset_), memory = H5Screate_simple(int(count.size()), count.data(), nullptr);
+  const Hdf5Space file_space = H5Dget_space(dataset_),
+                  memory = H5Screate_simple(int(count.size()), count.data(), nullptr);
   H5Sselect_hyperslab(file_space, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
   written(H5Dwrite(dataset_, H5T_NATIVE_DOUBLE, memory, file_space, H5P_DEFAULT, values), write_failed);
 }

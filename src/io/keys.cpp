@@ -27,21 +27,36 @@ std::string numberText(double value) {
 
 const char *typeName(KeyType type) {
   switch (type) {
-  case KeyType::number: return "number";
-  case KeyType::integer: return "whole number";
-  case KeyType::flag: return "true or false";
-  case KeyType::word: return "word";
-  case KeyType::text: return "text";
-  case KeyType::file: return "file";
-  case KeyType::vector: return "three numbers";
-  case KeyType::pair: return "one or two numbers";
-  case KeyType::vectors: return "list of vectors";
-  case KeyType::index: return "number from 0, or last";
-  case KeyType::rod: return "name, number or all";
-  case KeyType::rows: return "rows of numbers";
-  case KeyType::list: return "list";
-  case KeyType::map: return "map";
-  case KeyType::word_or_map: return "word or map";
+  case KeyType::number:
+    return "number";
+  case KeyType::integer:
+    return "whole number";
+  case KeyType::flag:
+    return "true or false";
+  case KeyType::word:
+    return "word";
+  case KeyType::text:
+    return "text";
+  case KeyType::file:
+    return "file";
+  case KeyType::vector:
+    return "three numbers";
+  case KeyType::pair:
+    return "one or two numbers";
+  case KeyType::vectors:
+    return "list of vectors";
+  case KeyType::index:
+    return "number from 0, or last";
+  case KeyType::rod:
+    return "name, number or all";
+  case KeyType::rows:
+    return "rows of numbers";
+  case KeyType::list:
+    return "list";
+  case KeyType::map:
+    return "map";
+  case KeyType::word_or_map:
+    return "word or map";
   }
   return "";
 }
@@ -57,10 +72,15 @@ void addOption(std::ostringstream &out, const std::string &name, const Key &key)
   if (!choices.empty())
     head += " " + choices;
   else if (key.type != KeyType::flag)
-    head += key.type == KeyType::vector ? " x,y,z" : key.type == KeyType::file ? " PATH" : key.type == KeyType::text ? " TEXT" : key.type == KeyType::pair ? " N[,N]" : " N";
+    head += key.type == KeyType::vector ? " x,y,z"
+            : key.type == KeyType::file ? " PATH"
+            : key.type == KeyType::text ? " TEXT"
+            : key.type == KeyType::pair ? " N[,N]"
+                                        : " N";
   std::string tail = key.meaning;
   if (*key.unit) tail += std::string(" [") + key.unit + "]";
-  if (key.isOption() && !key.isRequired()) tail += key.hasFallback() ? std::string(" (default ") + key.fallback + ")" : std::string(" ") + key.fallback;
+  if (key.isOption() && !key.isRequired())
+    tail += key.hasFallback() ? std::string(" (default ") + key.fallback + ")" : std::string(" ") + key.fallback;
   std::istringstream words(tail);
   std::string line = head.size() < column ? head + std::string(column - head.size(), ' ') : head + "  ";
   bool first = true;
@@ -81,8 +101,12 @@ constexpr const char *three_numbers = R"({"type": "array", "items": {"type": "nu
 
 std::string boundsText(const Key &key) {
   std::string text;
-  if (std::isfinite(key.bounds.least)) text += std::string(key.bounds.above ? ", \"exclusiveMinimum\": " : ", \"minimum\": ") + numberText(key.bounds.least);
-  if (std::isfinite(key.bounds.most)) text += std::string(key.bounds.below ? ", \"exclusiveMaximum\": " : ", \"maximum\": ") + numberText(key.bounds.most);
+  if (std::isfinite(key.bounds.least))
+    text +=
+        std::string(key.bounds.above ? ", \"exclusiveMinimum\": " : ", \"minimum\": ") + numberText(key.bounds.least);
+  if (std::isfinite(key.bounds.most))
+    text +=
+        std::string(key.bounds.below ? ", \"exclusiveMaximum\": " : ", \"maximum\": ") + numberText(key.bounds.most);
   return text;
 }
 
@@ -123,26 +147,39 @@ std::string blockSchema(const std::string &block);
 std::string valueSchema(const Key &key) {
   const std::string path = key.path;
   switch (key.type) {
-  case KeyType::number: return "\"type\": \"number\"" + boundsText(key);
-  case KeyType::integer: return "\"type\": \"integer\"" + boundsText(key);
-  case KeyType::flag: return "\"type\": \"boolean\"";
+  case KeyType::number:
+    return "\"type\": \"number\"" + boundsText(key);
+  case KeyType::integer:
+    return "\"type\": \"integer\"" + boundsText(key);
+  case KeyType::flag:
+    return "\"type\": \"boolean\"";
   case KeyType::text:
-  case KeyType::file: return "\"type\": [\"string\", \"number\"]"; // YAML takes a word of digits for a number
-  case KeyType::rod: return "\"type\": [\"string\", \"integer\"]";
-  case KeyType::vector: return std::string(three_numbers).substr(1, std::string(three_numbers).size() - 2);
-  case KeyType::vectors: return std::string("\"type\": \"array\", \"minItems\": 1, \"items\": ") + three_numbers;
+  case KeyType::file:
+    return "\"type\": [\"string\", \"number\"]"; // YAML takes a word of digits for a number
+  case KeyType::rod:
+    return "\"type\": [\"string\", \"integer\"]";
+  case KeyType::vector:
+    return std::string(three_numbers).substr(1, std::string(three_numbers).size() - 2);
+  case KeyType::vectors:
+    return std::string("\"type\": \"array\", \"minItems\": 1, \"items\": ") + three_numbers;
   case KeyType::pair: {
     const std::string one = "{\"type\": \"number\"" + boundsText(key) + "}";
     return "\"anyOf\": [" + one + ", {\"type\": \"array\", \"items\": " + one + ", \"minItems\": 2, \"maxItems\": 2}]";
   }
-  case KeyType::index: return "\"anyOf\": [{\"type\": \"integer\", \"minimum\": 0}, {\"const\": \"last\"}]";
+  case KeyType::index:
+    return "\"anyOf\": [{\"type\": \"integer\", \"minimum\": 0}, {\"const\": \"last\"}]";
   case KeyType::rows:
     return R"("type": "array", "minItems": 1, "items": {"type": "array", "items": {"type": "number"},
  "oneOf": [{"minItems": 4, "maxItems": 4}, {"minItems": 7, "maxItems": 7}]})";
-  case KeyType::word: return enumSchema(key);
-  case KeyType::list: return "\"type\": \"array\", \"items\": {" + blockSchema(path + "[]") + "}" + (key.isRequired() ? ", \"minItems\": 1" : "");
-  case KeyType::map: return blockSchema(path);
-  case KeyType::word_or_map: return "\"anyOf\": [{" + enumSchema(key) + "}, {" + blockSchema(path) + "}]";
+  case KeyType::word:
+    return enumSchema(key);
+  case KeyType::list:
+    return "\"type\": \"array\", \"items\": {" + blockSchema(path + "[]") + "}" +
+           (key.isRequired() ? ", \"minItems\": 1" : "");
+  case KeyType::map:
+    return blockSchema(path);
+  case KeyType::word_or_map:
+    return "\"anyOf\": [{" + enumSchema(key) + "}, {" + blockSchema(path) + "}]";
   }
   return {};
 }
@@ -156,8 +193,10 @@ std::string blockSchema(const std::string &block) {
     if (*key.unit) about += std::string(" [") + key.unit + "]";
     if (!properties.empty()) properties += ",\n";
     properties += " " + name + ": {\"description\": " + inQuotes(about) + ", " + valueSchema(key);
-    const bool plain = key.type == KeyType::number || key.type == KeyType::integer || key.type == KeyType::flag || key.type == KeyType::vector || key.type == KeyType::pair;
-    if (key.hasFallback()) properties += ", \"default\": " + (plain ? std::string(key.fallback) : inQuotes(key.fallback));
+    const bool plain = key.type == KeyType::number || key.type == KeyType::integer || key.type == KeyType::flag ||
+                       key.type == KeyType::vector || key.type == KeyType::pair;
+    if (key.hasFallback())
+      properties += ", \"default\": " + (plain ? std::string(key.fallback) : inQuotes(key.fallback));
     properties += "}";
     if (key.isRequired()) required += (required.empty() ? "" : ", ") + name;
   }
@@ -174,7 +213,8 @@ std::string helpText() {
   out << "tendril: elastic rods. Runs a scene and writes a trajectory.\n"
          "  tendril data/scenes/helix.yaml -dt 5e-3 -t_end 2 -output_dir out/helix\n"
          "  tendril --help | --version\n";
-  const std::pair<const char *, const char *> groups[] = {{"scene", "Scene"},       {"time", "Time, or load"}, {"solver", "Solver"}, {"rods", "Rods: for all of them"},
+  const std::pair<const char *, const char *> groups[] = {{"scene", "Scene"},       {"time", "Time, or load"},
+                                                          {"solver", "Solver"},     {"rods", "Rods: for all of them"},
                                                           {"accuracy", "Accuracy"}, {"output", "Output"}};
   for (const auto &[group, title] : groups) {
     out << title << "\n";
@@ -183,7 +223,8 @@ std::string helpText() {
     for (const Key &key : keys)
       if (key.isOption() && std::string_view(key.group) == group) addOption(out, std::string(key.name()), key);
   }
-  out << "PETSc's -snes_*, -ksp_*, -pc_*, -mat_*, -log_view, -options_file work, too; tendril -scene FILE -help lists them.\n";
+  out << "PETSc's -snes_*, -ksp_*, -pc_*, -mat_*, -log_view, -options_file work, too; tendril -scene FILE -help lists "
+         "them.\n";
   return out.str();
 }
 
@@ -191,18 +232,23 @@ std::string keysAsJson() {
   std::string out = "[";
   for (const Key &key : keys) {
     if (out.size() > 1) out += ",\n ";
-    out += "{\"path\": " + inQuotes(key.path) + ", \"type\": " + inQuotes(typeName(key.type)) + ", \"unit\": " + inQuotes(key.unit) + ", \"fallback\": " + inQuotes(key.fallback) +
-           ", \"meaning\": " + inQuotes(key.meaning) + ", \"choices\": " + inQuotes(key.choices) + ", \"example\": " + inQuotes(key.example) + ", \"group\": " + inQuotes(key.group) +
+    out += "{\"path\": " + inQuotes(key.path) + ", \"type\": " + inQuotes(typeName(key.type)) +
+           ", \"unit\": " + inQuotes(key.unit) + ", \"fallback\": " + inQuotes(key.fallback) +
+           ", \"meaning\": " + inQuotes(key.meaning) + ", \"choices\": " + inQuotes(key.choices) +
+           ", \"example\": " + inQuotes(key.example) + ", \"group\": " + inQuotes(key.group) +
            ", \"more\": " + inQuotes(key.more);
-    if (std::isfinite(key.bounds.least)) out += ", \"least\": " + numberText(key.bounds.least) + ", \"above\": " + (key.bounds.above ? "true" : "false");
-    if (std::isfinite(key.bounds.most)) out += ", \"most\": " + numberText(key.bounds.most) + ", \"below\": " + (key.bounds.below ? "true" : "false");
+    if (std::isfinite(key.bounds.least))
+      out += ", \"least\": " + numberText(key.bounds.least) + ", \"above\": " + (key.bounds.above ? "true" : "false");
+    if (std::isfinite(key.bounds.most))
+      out += ", \"most\": " + numberText(key.bounds.most) + ", \"below\": " + (key.bounds.below ? "true" : "false");
     out += "}";
   }
   return out + "]\n";
 }
 
 std::string schemaAsJson() {
-  return "{\"$schema\": \"http://json-schema.org/draft-07/schema#\", \"title\": \"A scene of tendril\", " + blockSchema("") + "}\n";
+  return "{\"$schema\": \"http://json-schema.org/draft-07/schema#\", \"title\": \"A scene of tendril\", " +
+         blockSchema("") + "}\n";
 }
 
 } // namespace tendril

@@ -42,10 +42,12 @@ Material readSection(MaterialReader &in) {
   const bool by_radius = in.isOverridden("rods[].material.radius"), by_radii = in.isOverridden("rods[].material.radii"),
              by_sides = in.isOverridden("rods[].material.width") || in.isOverridden("rods[].material.height");
   const bool any = by_radius || by_radii || by_sides;
-  const bool circle = in.has("rods[].material.radius") && (!any || by_radius), ellipse = in.has("rods[].material.radii") && (!any || by_radii),
+  const bool circle = in.has("rods[].material.radius") && (!any || by_radius),
+             ellipse = in.has("rods[].material.radii") && (!any || by_radii),
              rectangle = (in.has("rods[].material.width") || in.has("rods[].material.height")) && (!any || by_sides);
   if (int(circle) + int(ellipse) + int(rectangle) != 1)
-    in.block().fail("a homogeneous section needs one of 'radius', 'radii: [along the first director, along the second]', or 'width' and 'height'");
+    in.block().fail("a homogeneous section needs one of 'radius', 'radii: [along the first director, along the "
+                    "second]', or 'width' and 'height'");
   if (circle)
     section = {SectionShape::circle, {in.number("rods[].material.radius"), 0}};
   else if (ellipse)
@@ -54,8 +56,11 @@ Material readSection(MaterialReader &in) {
     section = {SectionShape::rectangle, {in.number("rods[].material.width"), in.number("rods[].material.height")}};
   const double young = in.number("rods[].material.young");
   const bool poisson = in.has("rods[].material.poisson"), given = in.has("rods[].material.shear");
-  if (poisson == given) in.block().fail(std::string("a homogeneous section needs 'poisson' or 'shear', found ") + (given ? "both" : "none"));
-  const double shear = given ? in.number("rods[].material.shear") : young / (2 * (1 + in.number("rods[].material.poisson")));
+  if (poisson == given)
+    in.block().fail(std::string("a homogeneous section needs 'poisson' or 'shear', found ") +
+                    (given ? "both" : "none"));
+  const double shear =
+      given ? in.number("rods[].material.shear") : young / (2 * (1 + in.number("rods[].material.poisson")));
   return homogeneousMaterial(section, young, shear, in.number("rods[].material.density"));
 }
 
@@ -63,10 +68,12 @@ Material readSection(MaterialReader &in) {
 
 MaterialRead readMaterial(YamlMap &rod, const Overrides &overrides) {
   const std::vector<const Key *> rows = rodOverrides();
-  const bool by_options = std::any_of(rows.begin(), rows.end(),
-                                      [&](const Key *key) { return key->parent() == "rods[].material" && overrides.count(std::string(key->name())) > 0; });
+  const bool by_options = std::any_of(rows.begin(), rows.end(), [&](const Key *key) {
+    return key->parent() == "rods[].material" && overrides.count(std::string(key->name())) > 0;
+  });
   const bool written = rod.has("rods[].material") || !by_options;
-  const YamlValue block = written ? rod.at("rods[].material") : YamlValue(YAML::Load("{}"), rod.value().file(), "material");
+  const YamlValue block =
+      written ? rod.at("rods[].material") : YamlValue(YAML::Load("{}"), rod.value().file(), "material");
   if (!block.isMap()) rod.word("rods[].material");
   YamlMap map(block.isMap() ? block : YamlValue(YAML::Load("{}"), block.file(), "material"), "rods[].material");
   MaterialReader in(map, overrides);
@@ -74,8 +81,9 @@ MaterialRead readMaterial(YamlMap &rod, const Overrides &overrides) {
   Material &m = out.material;
   bool section = false;
   for (const AnyKey key :
-       {AnyKey("rods[].material.radius"), AnyKey("rods[].material.radii"), AnyKey("rods[].material.width"), AnyKey("rods[].material.height"),
-        AnyKey("rods[].material.young"), AnyKey("rods[].material.poisson"), AnyKey("rods[].material.shear"), AnyKey("rods[].material.density")})
+       {AnyKey("rods[].material.radius"), AnyKey("rods[].material.radii"), AnyKey("rods[].material.width"),
+        AnyKey("rods[].material.height"), AnyKey("rods[].material.young"), AnyKey("rods[].material.poisson"),
+        AnyKey("rods[].material.shear"), AnyKey("rods[].material.density")})
     section = in.has(key) || section;
   if (section) m = readSection(in);
   // The stiffness parameters; beside a section they replace what follows from it.
@@ -100,24 +108,31 @@ MaterialRead readMaterial(YamlMap &rod, const Overrides &overrides) {
   replace("rods[].material.axial_stiffness", m.axial_stiffness);
   replace("rods[].material.torsional_stiffness", m.torsional_stiffness, twists);
   if (const std::string values = defaults.str(); !values.empty())
-    out.defaults = (block.isMap() ? "warning: the material is not complete, by default: " : "default material: ") + values;
+    out.defaults =
+        (block.isMap() ? "warning: the material is not complete, by default: " : "default material: ") + values;
   m.mass_damping_coefficient = in.number("rods[].material.mass_damping_coefficient");
   m.stiffness_damping_coefficient = in.number("rods[].material.stiffness_damping_coefficient");
   map.finish();
   // Sections of 1e-100 or 1e100 m leave the range of numbers.
   const double bending = section && !in.has(*flexural) ? 0 : 1; // where stiffnesses are given, they may be zero
-  for (const double v : {m.linear_density, m.axial_stiffness, 1 + m.linear_rotational_inertia, 1 + m.torsional_stiffness, bending + m.flexural_stiffness[0],
-                         bending + m.flexural_stiffness[1]})
-    if (!(v > 0 && std::isfinite(v))) in.block().fail("the material's stiffness or density comes out as zero or infinite; check its numbers (SI units)");
+  for (const double v :
+       {m.linear_density, m.axial_stiffness, 1 + m.linear_rotational_inertia, 1 + m.torsional_stiffness,
+        bending + m.flexural_stiffness[0], bending + m.flexural_stiffness[1]})
+    if (!(v > 0 && std::isfinite(v)))
+      in.block().fail(
+          "the material's stiffness or density comes out as zero or infinite; check its numbers (SI units)");
   if (twists && m.torsional_stiffness == 0 && m.linear_rotational_inertia == 0)
-    in.block().fail("'torsional_stiffness' and 'linear_rotational_inertia' are both zero: nothing resists turning about the axis; give one of them");
+    in.block().fail("'torsional_stiffness' and 'linear_rotational_inertia' are both zero: nothing resists turning "
+                    "about the axis; give one of them");
   return out;
 }
 
 std::vector<const Key *> rodOverrides() {
   std::vector<const Key *> rows;
   for (const Key &key : keys)
-    if (const std::string_view path = key.path; key.parent() == "rods[].material" || path == "rods[].measure" || path == "rods[].energy") rows.push_back(&key);
+    if (const std::string_view path = key.path;
+        key.parent() == "rods[].material" || path == "rods[].measure" || path == "rods[].energy")
+      rows.push_back(&key);
   return rows;
 }
 

@@ -15,7 +15,9 @@ namespace {
 
 bool isYaml(const std::string &file) { return file.ends_with(".yaml") || file.ends_with(".yml"); }
 
-bool isOption(const std::string &word) { return word.size() > 1 && word[0] == '-' && (std::isalpha(static_cast<unsigned char>(word[1])) || word[1] == '-'); }
+bool isOption(const std::string &word) {
+  return word.size() > 1 && word[0] == '-' && (std::isalpha(static_cast<unsigned char>(word[1])) || word[1] == '-');
+}
 
 struct Given {
   int line;
@@ -27,7 +29,9 @@ using Places = std::map<std::string, Given>;
 bool holdsWord(std::string text, std::string word) {
   for (std::string *s : {&text, &word})
     for (char &c : *s) c = char(std::tolower(static_cast<unsigned char>(c)));
-  auto inWord = [&](std::size_t k) { return k < text.size() && (std::isalnum(static_cast<unsigned char>(text[k])) || text[k] == '_'); };
+  auto inWord = [&](std::size_t k) {
+    return k < text.size() && (std::isalnum(static_cast<unsigned char>(text[k])) || text[k] == '_');
+  };
   for (std::size_t at = text.find(word); at != std::string::npos; at = text.find(word, at + 1))
     if (!inWord(at + word.size()) && (at == 0 || !inWord(at - 1))) return true;
   return false;
@@ -40,19 +44,25 @@ void collect(const YamlValue &value, const std::string &prefix, Places &places) 
     const YAML::Node key_node = entry.first, node = entry.second;
     const YamlValue key(key_node, value.file(), "options");
     const std::string word = key.text();
-    if (word.empty() || !std::isalpha(static_cast<unsigned char>(word[0]))) key.fail("'" + word + "' is no name of an option; write names without their dash");
+    if (word.empty() || !std::isalpha(static_cast<unsigned char>(word[0])))
+      key.fail("'" + word + "' is no name of an option; write names without their dash");
     const std::string name = prefix + word;
     if (node.IsMap()) {
       collect(YamlValue(node, value.file(), name), name + "_", places);
       continue;
     }
-    if (name.rfind("options_file", 0) == 0) key.fail("a file of options names no other; give each with its own -options_file");
+    if (name.rfind("options_file", 0) == 0)
+      key.fail("a file of options names no other; give each with its own -options_file");
     if (node.IsSequence())
       for (const YAML::Node &item : node)
-        if (!item.IsScalar()) key.fail("'" + name + "' is a list of more than values, which no option takes (a scene is given by -scene)");
+        if (!item.IsScalar())
+          key.fail("'" + name + "' is a list of more than values, which no option takes (a scene is given by -scene)");
     const YAML::Node scalar = node.IsSequence() && node.size() > 0 ? YAML::Node(node[0]) : YAML::Node(node);
-    const auto [first, fresh] = places.emplace(name, Given{key_node.Mark().line + 1, scalar.IsScalar() ? scalar.Scalar() : ""});
-    if (!fresh) key.fail("the option '" + name + "' stands here a second time (first in line " + std::to_string(first->second.line) + "); keep one of the two");
+    const auto [first, fresh] =
+        places.emplace(name, Given{key_node.Mark().line + 1, scalar.IsScalar() ? scalar.Scalar() : ""});
+    if (!fresh)
+      key.fail("the option '" + name + "' stands here a second time (first in line " +
+               std::to_string(first->second.line) + "); keep one of the two");
   }
 }
 
@@ -81,7 +91,9 @@ void OptionFiles::readPlain(const std::string &file) {
     std::string word;
     if (!(words >> word) || std::string("#%!").find(word[0]) != std::string::npos) continue;
     const std::string place = file + ":" + std::to_string(number);
-    if (!isOption(word)) throw SceneError(place + ": '" + word + "' is no option; options begin with -, and files in YAML are named *.yaml");
+    if (!isOption(word))
+      throw SceneError(place + ": '" + word +
+                       "' is no option; options begin with -, and files in YAML are named *.yaml");
     std::string value, rest;
     if (words >> value >> rest && value[0] != '"' && rest[0] != '#')
       throw SceneError(place + ": '" + rest + "' is too much; write an option and its value a line");
@@ -110,7 +122,8 @@ void OptionFiles::read(int argc, char **argv) {
     if (file.find('$') != std::string::npos) continue; // a variable, which PETSc replaces
     const std::string named = "option " + option + ": '" + file;
     if (std::filesystem::is_directory(file)) throw SceneError(named + "' is a folder; give a file");
-    if (!std::ifstream(file)) throw SceneError(named + "' cannot be opened; its path begins in the folder where tendril is started");
+    if (!std::ifstream(file))
+      throw SceneError(named + "' cannot be opened; its path begins in the folder where tendril is started");
     files_.push_back(file);
     if (option == "-options_file_yaml" || isYaml(file))
       readYaml(file);
@@ -124,7 +137,8 @@ std::string OptionFiles::place(const std::string &option) const {
   return found == places_.end() ? "" : found->second;
 }
 
-/// The options whose value, or what a colon divides off it, a message of PETSc tells; not numbers, which may be any. With their places.
+/// The options whose value, or what a colon divides off it, a message of PETSc tells; not numbers, which may be any.
+/// With their places.
 std::string OptionFiles::toldIn(const std::string &message) const {
   std::string text;
   for (const auto &[name, value] : values_) {
@@ -149,7 +163,8 @@ std::string OptionFiles::locate(const std::string &message) const {
     const std::string where = place(name.substr(0, name.find(':')));
     return where.empty() ? message : where + ": " + message;
   }
-  const bool of_petsc = message.rfind("setting up the solvers", 0) == 0 || message.rfind("command line", 0) == 0 || message.rfind("solving", 0) == 0;
+  const bool of_petsc = message.rfind("setting up the solvers", 0) == 0 || message.rfind("command line", 0) == 0 ||
+                        message.rfind("solving", 0) == 0;
   if (!of_petsc) return message;
   if (const std::string told = toldIn(message); !told.empty()) return told + ": " + message;
   if (files_.empty()) return message;

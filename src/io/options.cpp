@@ -22,9 +22,12 @@ std::string joined(const std::vector<std::string> &words) {
   return text;
 }
 
-constexpr std::array<std::string_view, 4> bifurcations{"off", "locate", "stop", "switch"}; ///< in the order of Bifurcation
+constexpr std::array<std::string_view, 4> bifurcations{"off", "locate", "stop",
+                                                       "switch"}; ///< in the order of Bifurcation
 
-[[noreturn]] void fail(const std::string &option, const std::string &message) { throw SceneError("option -" + option + ": " + message); }
+[[noreturn]] void fail(const std::string &option, const std::string &message) {
+  throw SceneError("option -" + option + ": " + message);
+}
 
 /// Our options as text, read by the table of keys.
 class Texts {
@@ -39,7 +42,9 @@ public:
 
   bool isGiven(const std::string &option) const { return given_.count(option) > 0; }
   bool has(AnyKey key) const { return isGiven(key->path); }
-  std::string text(const Key &key) const { return isGiven(key.path) ? given_.at(key.path) : key.hasFallback() ? key.fallback : ""; }
+  std::string text(const Key &key) const {
+    return isGiven(key.path) ? given_.at(key.path) : key.hasFallback() ? key.fallback : "";
+  }
   std::string text(KeyOf<KeyType::text, KeyType::file> key) const { return text(*key); }
   const std::string &given(const std::string &option) const { return given_.at(option); }
 
@@ -65,7 +70,8 @@ public:
 
   Vec3 vector(KeyOf<KeyType::vector> key) const {
     const std::vector<double> v = numbers(*key);
-    if (v.size() != 3) fail(*key, std::string("needs three numbers, e.g. ") + key->example + "; found '" + text(*key) + "'");
+    if (v.size() != 3)
+      fail(*key, std::string("needs three numbers, e.g. ") + key->example + "; found '" + text(*key) + "'");
     return {v[0], v[1], v[2]};
   }
 
@@ -76,10 +82,13 @@ public:
     std::string all;
     for (const std::string &c : choices) all += (all.empty() ? "" : ", ") + c;
     const std::string near = closest(value, choices);
-    fail(*key, "must be one of " + all + "; found '" + value + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?"));
+    fail(*key,
+         "must be one of " + all + "; found '" + value + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?"));
   }
 
-  [[noreturn]] static void fail(const Key &key, const std::string &message) { tendril::fail(std::string(key.name()), message); }
+  [[noreturn]] static void fail(const Key &key, const std::string &message) {
+    tendril::fail(std::string(key.name()), message);
+  }
 
 private:
   std::map<std::string, std::string> given_;
@@ -96,7 +105,8 @@ private:
   }
 
   double inBounds(const Key &key, double value) const {
-    if (const std::string wrong = outOfBounds(key, value); !wrong.empty()) fail(key, wrong + ", found '" + text(key) + "'");
+    if (const std::string wrong = outOfBounds(key, value); !wrong.empty())
+      fail(key, wrong + ", found '" + text(key) + "'");
     return value;
   }
 
@@ -124,8 +134,10 @@ std::vector<std::pair<std::string, int>> readRodEdges(const std::string &text) {
   std::istringstream in(text);
   for (std::string word; std::getline(in, word, ',');) {
     const std::size_t colon = word.rfind(':');
-    const YamlValue number(YAML::Node(colon == std::string::npos ? word : word.substr(colon + 1)), "option -rod_edges", "edges");
-    edges.emplace_back(colon == std::string::npos ? "all" : word.substr(0, colon), number.integer(*KeyOf<KeyType::integer>("rods[].line.edges")));
+    const YamlValue number(YAML::Node(colon == std::string::npos ? word : word.substr(colon + 1)), "option -rod_edges",
+                           "edges");
+    edges.emplace_back(colon == std::string::npos ? "all" : word.substr(0, colon),
+                       number.integer(*KeyOf<KeyType::integer>("rods[].line.edges")));
   }
   return edges;
 }
@@ -137,10 +149,12 @@ std::set<std::string> readFields(const Texts &texts) {
   for (std::string word; std::getline(in, word, ',');) {
     if (word == "all")
       fields.insert(names.begin(), names.end());
-    else if (std::find(names.begin(), names.end(), word) != names.end() || std::find(derived.begin(), derived.end(), word) != derived.end())
+    else if (std::find(names.begin(), names.end(), word) != names.end() ||
+             std::find(derived.begin(), derived.end(), word) != derived.end())
       fields.insert(word);
     else
-      fail("output_fields", "there is no field '" + word + "'; choose from all," + joined(names) + "," + joined(derived));
+      fail("output_fields",
+           "there is no field '" + word + "'; choose from all," + joined(names) + "," + joined(derived));
   }
   return fields;
 }
@@ -154,7 +168,9 @@ PetscErrorCode refuseUnsuited() {
     const char *option, *fits, *reason; ///< the one value that fits; empty: none does
   };
   constexpr Unsuited unsuited[] = {
-      {"snes_type", "newtonls", "is always newtonls: what counts as an answer, ways out of saddles and steps on the manifold of frames are its own"},
+      {"snes_type", "newtonls",
+       "is always newtonls: what counts as an answer, ways out of saddles and steps on the manifold of frames are its "
+       "own"},
       {"snes_mf", "", "is not for rods: the Hessian is exact, and cheaper than a difference of residuals"},
       {"snes_mf_operator", "", "is not for rods: the Hessian is exact, and cheaper than a difference of residuals"},
       {"snes_fd", "", "is not for rods: the Hessian is exact; tests compare it with automatic differentiation"},
@@ -164,18 +180,22 @@ PetscErrorCode refuseUnsuited() {
   for (const Unsuited &u : unsuited) {
     char value[PETSC_MAX_PATH_LEN];
     PetscBool given;
-    PetscCall(PetscOptionsGetString(nullptr, nullptr, (std::string("-") + u.option).c_str(), value, sizeof value, &given));
+    PetscCall(
+        PetscOptionsGetString(nullptr, nullptr, (std::string("-") + u.option).c_str(), value, sizeof value, &given));
     const std::string word = value;
     if (given && word != "false" && word != "0" && (word.empty() || word != u.fits)) fail(u.option, u.reason);
   }
   char search[PETSC_MAX_PATH_LEN];
   PetscBool given;
   PetscCall(PetscOptionsGetString(nullptr, nullptr, "-snes_linesearch_type", search, sizeof search, &given));
-  if (given && std::string(search) == "shell") fail("snes_linesearch_type", "shell needs a program's own function; use retraction, basic, bt, l2 or cp");
+  if (given && std::string(search) == "shell")
+    fail("snes_linesearch_type", "shell needs a program's own function; use retraction, basic, bt, l2 or cp");
   PetscFunctionReturn(0);
 }
 
-bool isOptionName(const char *word) { return word[0] == '-' && (std::isalpha(static_cast<unsigned char>(word[1])) || word[1] == '-'); }
+bool isOptionName(const char *word) {
+  return word[0] == '-' && (std::isalpha(static_cast<unsigned char>(word[1])) || word[1] == '-');
+}
 
 } // namespace
 
@@ -184,7 +204,8 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   PetscFunctionBeginUser;
   for (int i = 1; i < argc; ++i)
     if (!isOptionName(argv[i]) && (i == 1 || !isOptionName(argv[i - 1])))
-      throw SceneError(std::string("command line: '") + argv[i] + "' belongs to no option; options begin with - and take one value (lists without blanks)");
+      throw SceneError(std::string("command line: '") + argv[i] +
+                       "' belongs to no option; options begin with - and take one value (lists without blanks)");
   Texts texts;
   PetscCall(texts.read());
   PetscCall(PetscOptionsHasName(nullptr, nullptr, "-help", &set));
@@ -198,13 +219,15 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   if (texts.has("-dt_min")) o->loop.dt_min = texts.number("-dt_min");
   o->loop.integrator.name = texts.word("-integrator");
   o->loop.integrator.rho_inf = texts.number("-rho_inf");
-  if (texts.has("-rho_inf") && o->loop.integrator.name != "generalized_alpha") fail("rho_inf", "needs -integrator generalized_alpha");
+  if (texts.has("-rho_inf") && o->loop.integrator.name != "generalized_alpha")
+    fail("rho_inf", "needs -integrator generalized_alpha");
   o->loop.adapt = texts.word("-dt_adapt") == "error" ? Adaptation::error : Adaptation::none;
   o->loop.dt_rtol = texts.number("-dt_rtol");
   o->loop.dt_atol = texts.number("-dt_atol");
   if (texts.has("-dt_max")) o->loop.dt_max = texts.number("-dt_max");
   for (const char *name : {"dt_rtol", "dt_atol", "dt_max"})
-    if (texts.isGiven(std::string("-") + name) && o->loop.adapt == Adaptation::none) fail(name, "needs -dt_adapt error");
+    if (texts.isGiven(std::string("-") + name) && o->loop.adapt == Adaptation::none)
+      fail(name, "needs -dt_adapt error");
   if (texts.has("-dt_adapt")) o->dynamic_only = "dt_adapt"; // -integrator may stay in statics, in sweeps over both
   if (texts.has("-load_steps")) o->given_load_steps = texts.integer("-load_steps");
   if (texts.has("-arclength_steps")) o->arclength_steps = texts.integer("-arclength_steps");
@@ -212,7 +235,8 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   o->loop.continuation = texts.word("-continuation") == "load" ? Continuation::load : Continuation::arclength;
   if (texts.has("-continuation")) o->continuation = o->loop.continuation;
   const std::string bifurcation = texts.word("-bifurcation");
-  o->loop.bifurcation = Bifurcation(std::find(bifurcations.begin(), bifurcations.end(), bifurcation) - bifurcations.begin());
+  o->loop.bifurcation =
+      Bifurcation(std::find(bifurcations.begin(), bifurcations.end(), bifurcation) - bifurcations.begin());
   if (texts.has("-bifurcation")) o->bifurcation = o->loop.bifurcation;
   if (texts.has("-gravity")) o->gravity = texts.vector("-gravity");
   o->rod_edges = readRodEdges(texts.text("-rod_edges"));
@@ -229,16 +253,20 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   if (texts.has("-accuracy_of")) o->accuracy_of = quantity;
   if (texts.has("-accuracy")) o->accuracy = {texts.number("-accuracy"), quantity};
   o->loop.solve.rounding_tolerance = texts.number("-rounding_tolerance");
-  o->loop.solve.retraction = texts.word("-retraction") == "additive" ? RetractionKind::additive : RetractionKind::length;
+  o->loop.solve.retraction =
+      texts.word("-retraction") == "additive" ? RetractionKind::additive : RetractionKind::length;
   const std::string search = texts.word("-line_search");
-  o->loop.solve.line_search = search == "wolfe" ? LineSearchKind::wolfe : search == "residual" ? LineSearchKind::residual : LineSearchKind::energy;
+  o->loop.solve.line_search = search == "wolfe"      ? LineSearchKind::wolfe
+                              : search == "residual" ? LineSearchKind::residual
+                                                     : LineSearchKind::energy;
   o->loop.solve.quasi_newton = texts.integer("-quasi_newton");
   o->loop.mixed = texts.word("-stretch") == "mixed";
   o->loop.hessian = texts.word("-hessian") == "exact" ? HessianKind::exact : HessianKind::gauss_newton;
   for (const Key *key : rodOverrides())
     if (const std::string name(key->name()); texts.isGiven("-rod_" + name)) {
       const std::string text = texts.given("-rod_" + name);
-      const bool bare = key->type == KeyType::pair && text.find(',') != std::string::npos && text[0] != '['; // as vectors are written
+      const bool bare =
+          key->type == KeyType::pair && text.find(',') != std::string::npos && text[0] != '['; // as vectors are written
       o->overrides[name] = bare ? "[" + text + "]" : text;
     }
   PetscCall(refuseUnsuited());
@@ -253,10 +281,14 @@ namespace {
 void checkAccuracy(const Options &o) {
   if (o.accuracy_of && !o.accuracy) fail("accuracy_of", "needs -accuracy, e.g. -accuracy 1e-3");
   if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength && (o.accuracy || o.error_estimate))
-    fail(o.accuracy ? "accuracy" : "error_estimate", "needs -continuation load: paths of two resolutions have no states in common");
-  if (o.accuracy && o.loop.bifurcation == Bifurcation::stop) fail("accuracy", "is that of the answer at full load; -bifurcation stop ends before");
-  if (o.accuracy && !o.rod_edges.empty()) fail("rod_edges", "gives the edges that -accuracy chooses; take one of the two away");
-  if (o.accuracy && !o.restart.empty()) fail("accuracy", "chooses the edges, which a checkpoint already has; take -restart or -accuracy away");
+    fail(o.accuracy ? "accuracy" : "error_estimate",
+         "needs -continuation load: paths of two resolutions have no states in common");
+  if (o.accuracy && o.loop.bifurcation == Bifurcation::stop)
+    fail("accuracy", "is that of the answer at full load; -bifurcation stop ends before");
+  if (o.accuracy && !o.rod_edges.empty())
+    fail("rod_edges", "gives the edges that -accuracy chooses; take one of the two away");
+  if (o.accuracy && !o.restart.empty())
+    fail("accuracy", "chooses the edges, which a checkpoint already has; take -restart or -accuracy away");
 }
 
 } // namespace
@@ -267,12 +299,15 @@ void resolve(const RunSettings &scene, Options &o) {
   if (o.loop.dynamic) {
     if (o.given_load_steps) fail("load_steps", "has no meaning in -mode dynamic; use -dt");
     if (o.continuation || o.bifurcation || o.arclength_steps)
-      fail(o.continuation ? "continuation" : o.bifurcation ? "bifurcation" : "arclength_steps", "has no meaning in -mode dynamic; use -mode static");
+      fail(o.continuation  ? "continuation"
+           : o.bifurcation ? "bifurcation"
+                           : "arclength_steps",
+           "has no meaning in -mode dynamic; use -mode static");
     o.loop.dt = o.dt.value_or(scene.dt);
     o.loop.t_end = o.t_end.value_or(scene.t_end);
     if (o.loop.t_end / o.loop.dt > 1e12)
-      fail("dt", "a step of " + std::to_string(o.loop.dt) + " s never reaches the end at " + std::to_string(o.loop.t_end) +
-                     " s; write a larger dt or a smaller t_end");
+      fail("dt", "a step of " + std::to_string(o.loop.dt) + " s never reaches the end at " +
+                     std::to_string(o.loop.t_end) + " s; write a larger dt or a smaller t_end");
   } else {
     if (o.dt) fail("dt", "has no meaning in -mode static; use -load_steps");
     if (o.t_end) fail("t_end", "has no meaning in -mode static; the load factor ends at 1");
@@ -283,10 +318,12 @@ void resolve(const RunSettings &scene, Options &o) {
     if (o.arclength_steps && !arclength) fail("arclength_steps", "needs -continuation arclength");
   }
   if (o.restart_time && o.restart.empty()) fail("restart_time", "needs -restart");
-  if (o.restart_time && !o.loop.dynamic) fail("restart_time", "has no meaning in -mode static, where time is the load factor");
+  if (o.restart_time && !o.loop.dynamic)
+    fail("restart_time", "has no meaning in -mode static, where time is the load factor");
   checkAccuracy(o);
   if (o.loop.dt_min > o.loop.dt) fail("dt_min", "must not be larger than the step " + shortText(o.loop.dt));
-  if (o.loop.dt_max > 0 && o.loop.dt_min > o.loop.dt_max) fail("dt_min", "must not be larger than -dt_max " + shortText(o.loop.dt_max));
+  if (o.loop.dt_max > 0 && o.loop.dt_min > o.loop.dt_max)
+    fail("dt_min", "must not be larger than -dt_max " + shortText(o.loop.dt_max));
 }
 
 std::vector<int> edgesAsked(const Scene &scene, const Options &o) {
@@ -294,8 +331,8 @@ std::vector<int> edgesAsked(const Scene &scene, const Options &o) {
   for (const auto &[name, number] : o.rod_edges) {
     const std::vector<int> rods = rodsOf(scene.rods, name);
     if (rods.empty())
-      fail("rod_edges",
-           "there is no rod '" + name + "'; write a name of the scene, a number from 0 to " + std::to_string(edges.size() - 1) + ", or edges alone for all");
+      fail("rod_edges", "there is no rod '" + name + "'; write a name of the scene, a number from 0 to " +
+                            std::to_string(edges.size() - 1) + ", or edges alone for all");
     for (const int r : rods) edges[r] = number;
   }
   return edges;
@@ -309,7 +346,8 @@ PetscErrorCode refuseUnknownOptions() {
   std::string unknown;
   for (PetscInt i = 0; i < n; ++i) {
     const std::string name = names[i];
-    const bool late = std::any_of(std::begin(late_options), std::end(late_options), [&](const char *p) { return name.rfind(p, 0) == 0; });
+    const bool late = std::any_of(std::begin(late_options), std::end(late_options),
+                                  [&](const char *p) { return name.rfind(p, 0) == 0; });
     if (!late && unknown.empty()) unknown = name;
   }
   PetscCall(PetscOptionsLeftRestore(nullptr, &n, &names, &values));
@@ -318,9 +356,11 @@ PetscErrorCode refuseUnknownOptions() {
   for (const Key &key : keys)
     if (key.isOption()) known.emplace_back(key.name());
   for (const Key *key : rodOverrides()) known.push_back("rod_" + std::string(key->name()));
-  const bool of_rod = std::find(known.begin(), known.end(), "rod_" + unknown) != known.end(); // a key of the scene, as in -young
+  const bool of_rod =
+      std::find(known.begin(), known.end(), "rod_" + unknown) != known.end(); // a key of the scene, as in -young
   const std::string near = of_rod ? "rod_" + unknown : closest(unknown, known);
-  fail(unknown, "unknown or unused" + (near.empty() ? "" : "; did you mean -" + near + "?") + " (-help lists all options)");
+  fail(unknown,
+       "unknown or unused" + (near.empty() ? "" : "; did you mean -" + near + "?") + " (-help lists all options)");
 }
 
 std::string writeOptionsFile(const std::string &path, const Options &o, const Provenance &p, const Scene &scene) {
@@ -368,7 +408,9 @@ std::string writeOptionsFile(const std::string &path, const Options &o, const Pr
   put("error_estimate", o.error_estimate);
   if (o.accuracy) {
     put("accuracy", o.accuracy->tolerance);
-    put("accuracy_of", o.accuracy->of == Quantity::tip ? "tip" : o.accuracy->of == Quantity::energy ? "energy" : "position");
+    put("accuracy_of", o.accuracy->of == Quantity::tip      ? "tip"
+                       : o.accuracy->of == Quantity::energy ? "energy"
+                                                            : "position");
   }
   put("rounding_tolerance", o.loop.solve.rounding_tolerance);
   constexpr const char *searches[] = {"energy", "wolfe", "residual"};

@@ -15,7 +15,8 @@ namespace tendril {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr const char *results[] = {"checkpoint.h5", "trajectory.h5", "trajectory.xdmf", "diagnostics.csv", "log.txt", "options.yaml"};
+constexpr const char *results[] = {"checkpoint.h5",   "trajectory.h5", "trajectory.xdmf",
+                                   "diagnostics.csv", "log.txt",       "options.yaml"};
 
 /// Checkpoints go first: of a folder cleared by half none is left.
 std::vector<std::string> removeResults(const std::string &folder) {
@@ -24,7 +25,9 @@ std::vector<std::string> removeResults(const std::string &folder) {
     for (const char *end : {"", ".part"}) {
       std::error_code error;
       if (fs::remove(folder + "/" + name + end, error)) removed.push_back(name + end);
-      if (error) throw SceneError("option -output_dir: '" + folder + "/" + name + end + "' of an earlier run cannot be removed; choose another folder");
+      if (error)
+        throw SceneError("option -output_dir: '" + folder + "/" + name + end +
+                         "' of an earlier run cannot be removed; choose another folder");
     }
   return removed;
 }
@@ -32,7 +35,8 @@ std::vector<std::string> removeResults(const std::string &folder) {
 /// Whether the file behind a descriptor is still that at the path.
 bool isAt(int file, const std::string &path) {
   struct stat here, there;
-  return fstat(file, &here) == 0 && stat(path.c_str(), &there) == 0 && here.st_ino == there.st_ino && here.st_dev == there.st_dev;
+  return fstat(file, &here) == 0 && stat(path.c_str(), &there) == 0 && here.st_ino == there.st_ino &&
+         here.st_dev == there.st_dev;
 }
 
 } // namespace
@@ -43,12 +47,14 @@ OutputFolder::OutputFolder(const std::string &path) : path_(path) {
   while (!error) {
     lock_ = open(lockPath().c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
     if (lock_ < 0) break;
-    const bool held = flock(lock_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK; // file systems without locks hold nothing
+    const bool held =
+        flock(lock_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK; // file systems without locks hold nothing
     if (held) {
       char owner[32] = "";
       const ssize_t n = pread(lock_, owner, sizeof owner - 1, 0);
       close(lock_);
-      throw SceneError("option -output_dir: another run" + (n > 0 ? " (process " + std::string(owner, std::size_t(n)) + ")" : std::string()) +
+      throw SceneError("option -output_dir: another run" +
+                       (n > 0 ? " (process " + std::string(owner, std::size_t(n)) + ")" : std::string()) +
                        " is writing to '" + path + "'; choose another folder");
     }
     if (isAt(lock_, lockPath())) break;
@@ -56,7 +62,8 @@ OutputFolder::OutputFolder(const std::string &path) : path_(path) {
     lock_ = -1;
   }
   const std::string owner = std::to_string(getpid());
-  if (lock_ < 0 || ftruncate(lock_, 0) != 0) throw SceneError("option -output_dir: '" + path + "' cannot be written; choose another folder");
+  if (lock_ < 0 || ftruncate(lock_, 0) != 0)
+    throw SceneError("option -output_dir: '" + path + "' cannot be written; choose another folder");
   (void)!pwrite(lock_, owner.data(), owner.size(), 0); // on a full disk without a number
 }
 
@@ -96,11 +103,13 @@ std::vector<std::string> OutputFolder::checkpoints() const {
 bool OutputFolder::replaces(const std::string &file) const {
   std::error_code error;
   auto isHere = [&](const std::string &folder) {
-    return std::any_of(std::begin(results), std::end(results), [&](const char *name) { return fs::equivalent(file, folder + "/" + name, error); });
+    return std::any_of(std::begin(results), std::end(results),
+                       [&](const char *name) { return fs::equivalent(file, folder + "/" + name, error); });
   };
   if (isHere(path_)) return true;
   const std::vector<int> numbers = parts();
-  return std::any_of(numbers.begin(), numbers.end(), [&](int n) { return isHere(path_ + "/part_" + std::to_string(n)); });
+  return std::any_of(numbers.begin(), numbers.end(),
+                     [&](int n) { return isHere(path_ + "/part_" + std::to_string(n)); });
 }
 
 std::vector<std::string> OutputFolder::clear() const {
@@ -123,7 +132,8 @@ std::string OutputFolder::setAside(const std::string &checkpoint) const {
   const std::string part = path_ + "/part_" + std::to_string(numbers.empty() ? 1 : numbers.back() + 1);
   std::error_code error;
   fs::create_directories(part, error);
-  for (auto name = std::rbegin(results); !error && name != std::rend(results); ++name) // the checkpoint last: until then it is found here
+  for (auto name = std::rbegin(results); !error && name != std::rend(results);
+       ++name) // the checkpoint last: until then it is found here
     if (const std::string from = path_ + "/" + *name; fs::exists(from)) fs::rename(from, part + "/" + *name, error);
   if (error) throw SceneError("option -output_dir: the results of the run before cannot be moved to '" + part + "'");
   return part + "/checkpoint.h5";

@@ -12,7 +12,9 @@
 namespace tendril {
 namespace {
 
-[[noreturn]] void fail(const std::string &path, int line, const std::string &message) { throw SceneError(path + ":" + std::to_string(line) + ": " + message); }
+[[noreturn]] void fail(const std::string &path, int line, const std::string &message) {
+  throw SceneError(path + ":" + std::to_string(line) + ": " + message);
+}
 
 Vec3 parsePoint(std::istream &in, const std::string &path, int line, const std::string &text) {
   Vec3 x;
@@ -35,7 +37,8 @@ std::vector<Polyline> readPoints(std::istream &file, const std::string &path) {
   std::vector<Polyline> lines(1);
   std::string text;
   auto endLine = [&](int number) {
-    if (lines.back().points.size() == 1) fail(path, number, "a polyline of one point ends here; it needs at least two, and no empty line between them");
+    if (lines.back().points.size() == 1)
+      fail(path, number, "a polyline of one point ends here; it needs at least two, and no empty line between them");
     if (!lines.back().points.empty()) lines.emplace_back();
   };
   int last = 0;
@@ -56,7 +59,8 @@ std::vector<Polyline> readPoints(std::istream &file, const std::string &path) {
   return lines;
 }
 
-/// Edges between numbered vertices as polylines: one that ends where it began is closed. A polyline stands where its first edge does, and runs its way.
+/// Edges between numbered vertices as polylines: one that ends where it began is closed. A polyline stands where its
+/// first edge does, and runs its way.
 class Chains {
 public:
   explicit Chains(std::string path) : path_(std::move(path)) {}
@@ -68,7 +72,9 @@ public:
       if (std::size_t(v) >= edges_at_.size()) edges_at_.resize(std::size_t(v) + 1, {-1, -1});
       auto &[first, second] = edges_at_[std::size_t(v)];
       if (second >= 0)
-        fail(path_, line, "vertex " + std::to_string(v + 1) + " has a third edge here, and rods do not branch; give every rod vertices of its own");
+        fail(path_, line,
+             "vertex " + std::to_string(v + 1) +
+                 " has a third edge here, and rods do not branch; give every rod vertices of its own");
       (first < 0 ? first : second) = edge;
     }
     edges_.push_back({from, to});
@@ -156,15 +162,19 @@ std::vector<Polyline> readHdf5(const std::string &path) {
   if (file.has("rod_vertex_offsets")) offsets = file.read("rod_vertex_offsets", 1);
   if (file.has("closed")) closed = file.read("closed", 1);
   bool fits = offsets.size() >= 2 && offsets.front() == 0 && offsets.back() == n;
-  for (std::size_t r = 0; r + 1 < offsets.size(); ++r) fits = fits && offsets[r + 1] == std::round(offsets[r + 1]) && offsets[r] + 2 <= offsets[r + 1];
+  for (std::size_t r = 0; r + 1 < offsets.size(); ++r)
+    fits = fits && offsets[r + 1] == std::round(offsets[r + 1]) && offsets[r] + 2 <= offsets[r + 1];
   if (!fits)
-    throw SceneError(path + ": 'rod_vertex_offsets' must rise from 0 to " + std::to_string(n) + ", the number of rows of 'position', by two or more a rod");
+    throw SceneError(path + ": 'rod_vertex_offsets' must rise from 0 to " + std::to_string(n) +
+                     ", the number of rows of 'position', by two or more a rod");
   if (!closed.empty() && closed.size() + 1 != offsets.size())
-    throw SceneError(path + ": 'closed' must have one number per rod (" + std::to_string(offsets.size() - 1) + "), found " + std::to_string(closed.size()));
+    throw SceneError(path + ": 'closed' must have one number per rod (" + std::to_string(offsets.size() - 1) +
+                     "), found " + std::to_string(closed.size()));
   std::vector<Polyline> lines;
   for (std::size_t r = 0; r + 1 < offsets.size(); ++r) {
     Polyline line;
-    for (int v = int(offsets[r]); v < int(offsets[r + 1]); ++v) line.points.emplace_back(x[3 * v], x[3 * v + 1], x[3 * v + 2]);
+    for (int v = int(offsets[r]); v < int(offsets[r + 1]); ++v)
+      line.points.emplace_back(x[3 * v], x[3 * v + 1], x[3 * v + 2]);
     line.closed = r < closed.size() && closed[r] != 0;
     lines.push_back(line);
   }
@@ -175,7 +185,8 @@ std::string textOf(const std::string &path, const std::string &missing) {
   constexpr std::size_t most = 2'000'000'000;
   std::string text = readBytes(path, missing, most);
   if (const std::size_t at = text.find('\0'); at != std::string::npos)
-    fail(path, 1 + int(std::count(text.begin(), text.begin() + std::ptrdiff_t(at), '\n')), "the byte 0x00 is no text; save the file as UTF-8");
+    fail(path, 1 + int(std::count(text.begin(), text.begin() + std::ptrdiff_t(at), '\n')),
+         "the byte 0x00 is no text; save the file as UTF-8");
   return text;
 }
 
@@ -203,7 +214,8 @@ std::vector<Polyline> readPolylines(const std::string &path) {
     lines = readHdf5(path);
   else
     throw SceneError(path + ": unknown kind of file '" + extension + "'; use .csv, .txt, .obj, .h5 or .hdf5");
-  if (lines.empty()) throw SceneError(path + ": holds no polyline" + (extension == ".obj" ? "; write one as an element 'l 1 2 3'" : ""));
+  if (lines.empty())
+    throw SceneError(path + ": holds no polyline" + (extension == ".obj" ? "; write one as an element 'l 1 2 3'" : ""));
   return lines;
 }
 

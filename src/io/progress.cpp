@@ -21,9 +21,10 @@ std::string fitted(const std::string &line) {
 } // namespace
 
 Progress::Progress(const LoopSettings &loop, const std::string &log_path)
-    : end_(loop.t_end), time_(loop.dynamic ? "time" : "load factor"), step_(loop.dynamic                                   ? "dt"
-                                                                            : loop.continuation == Continuation::arclength ? "length"
-                                                                                                                           : "increment"),
+    : end_(loop.t_end), time_(loop.dynamic ? "time" : "load factor"),
+      step_(loop.dynamic                                   ? "dt"
+            : loop.continuation == Continuation::arclength ? "length"
+                                                           : "increment"),
       terminal_(isatty(STDOUT_FILENO)), log_(std::fopen(log_path.c_str(), "w")) {
   if (!log_) throw SceneError(log_path + ": cannot be written; choose another folder with -output_dir");
   watch().restart();
@@ -82,8 +83,8 @@ void Progress::step(const Diagnostics &row) {
   if (!report && !rewrite) return;
   const double left = done > 0 ? row.wall_seconds * (1 - done) / done : 0;
   char line[200];
-  std::snprintf(line, sizeof line, "%s %.6g of %.6g  %s %.3g  its %d  energy %.6e J  %.0f s left", time_, row.time, end_, step_, row.dt, row.newton_iterations,
-                row.energy.total(), left);
+  std::snprintf(line, sizeof line, "%s %.6g of %.6g  %s %.3g  its %d  energy %.6e J  %.0f s left", time_, row.time,
+                end_, step_, row.dt, row.newton_iterations, row.energy.total(), left);
   tell(line, rewrite, report);
   if (rewrite) next_line_ = row.wall_seconds + 0.1;
   if (report) next_report_ = done + 0.1;

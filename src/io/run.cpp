@@ -1,9 +1,9 @@
 #include "tendril/io/run.hpp"
 
+#include "tendril/accuracy/accuracy.hpp"
 #include "tendril/dynamics/arc_length.hpp"
 #include "tendril/dynamics/simulation.hpp"
 #include "tendril/energy/widest_angle.hpp"
-#include "tendril/accuracy/accuracy.hpp"
 #include "tendril/io/checkpoint.hpp"
 #include "tendril/io/estimate_writer.hpp"
 #include "tendril/io/keys.hpp"
@@ -37,8 +37,8 @@ std::string groupsText(const Scene &scene) {
     if (scene.rods[r].material.isCable())
       s << ", a cable\n";
     else
-      s << ", rho g L^3/EI " << g.gravito_bending << ", EA L^2/EI " << g.axial_to_bending << ", largest turning " << g.largest_turning << " deg and twist "
-        << g.largest_twist << " deg per vertex\n";
+      s << ", rho g L^3/EI " << g.gravito_bending << ", EA L^2/EI " << g.axial_to_bending << ", largest turning "
+        << g.largest_turning << " deg and twist " << g.largest_twist << " deg per vertex\n";
   }
   if (shown < scene.rods.size()) s << "... and " << scene.rods.size() - shown << " more rods\n";
   constexpr double soft = 1e-4; // of the rod's own bending
@@ -50,8 +50,9 @@ std::string groupsText(const Scene &scene) {
     turning = std::max(turning, g.largest_turning);
     twist = std::max(twist, g.largest_twist);
     if (told || !(g.corner_softness > soft)) continue;
-    s << "warning: rod '" << rod.name << "' has a corner at vertex " << g.softest_corner << ", which 'energy: seed' makes softer by "
-      << shortText(g.corner_softness) << " of the bending of the whole rod, more with shorter edges, for stretch turns it; use 'energy: classical'\n";
+    s << "warning: rod '" << rod.name << "' has a corner at vertex " << g.softest_corner
+      << ", which 'energy: seed' makes softer by " << shortText(g.corner_softness)
+      << " of the bending of the whole rod, more with shorter edges, for stretch turns it; use 'energy: classical'\n";
     told = true;
   }
   if (turning > 30 || twist > 30)
@@ -66,7 +67,9 @@ std::string petscVersion() {
   return version;
 }
 
-std::string versionText() { return std::string("tendril ") + TENDRIL_VERSION + " (" + TENDRIL_GIT_COMMIT + "), " + petscVersion(); }
+std::string versionText() {
+  return std::string("tendril ") + TENDRIL_VERSION + " (" + TENDRIL_GIT_COMMIT + "), " + petscVersion();
+}
 
 Provenance provenance(int argc, char **argv) {
   Provenance p;
@@ -97,13 +100,15 @@ public:
 
 private:
   std::string message_;
-  static PetscErrorCode keep(MPI_Comm, int, const char *, const char *, PetscErrorCode code, PetscErrorType type, const char *text, void *message) {
+  static PetscErrorCode keep(MPI_Comm, int, const char *, const char *, PetscErrorCode code, PetscErrorType type,
+                             const char *text, void *message) {
     if (type == PETSC_ERROR_INITIAL && text) *static_cast<std::string *>(message) = text;
     return code;
   }
 };
 
-/// What PETSc finds wrong with the command line; empty when it has started. An error handler would be memory of ours, which -malloc_debug takes for corrupted.
+/// What PETSc finds wrong with the command line; empty when it has started. An error handler would be memory of ours,
+/// which -malloc_debug takes for corrupted.
 std::string initializePetsc(int *argc, char ***argv) {
   auto *const print = std::exchange(PetscErrorPrintf, &PetscErrorPrintfNone);
   const PetscErrorCode error = PetscInitialize(argc, argv, nullptr, nullptr);
@@ -117,14 +122,18 @@ std::string initializePetsc(int *argc, char ***argv) {
 /// All of a text. \throws WriteError
 void print(const std::string &text) {
   std::fputs(text.c_str(), stdout);
-  if (std::fflush(stdout) != 0 || std::ferror(stdout)) throw WriteError("standard output cannot be written; is the disk full?");
+  if (std::fflush(stdout) != 0 || std::ferror(stdout))
+    throw WriteError("standard output cannot be written; is the disk full?");
 }
 
 /// A rod that nothing holds has no equilibrium to find.
 void requireHeld(const Scene &scene) {
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
-    const bool held = std::any_of(scene.supports.begin(), scene.supports.end(), [&](const Support &s) { return s.rod == int(r) && s.holdsPosition(); });
-    if (!held) throw SceneError("rod '" + scene.rods[r].name + "' is free to move as a whole: -mode static needs a clamp or pins that hold every rod");
+    const bool held = std::any_of(scene.supports.begin(), scene.supports.end(),
+                                  [&](const Support &s) { return s.rod == int(r) && s.holdsPosition(); });
+    if (!held)
+      throw SceneError("rod '" + scene.rods[r].name +
+                       "' is free to move as a whole: -mode static needs a clamp or pins that hold every rod");
   }
 }
 
@@ -164,13 +173,16 @@ PetscErrorCode setUp(Prepared &prepared, Options &o) {
   resolve(file.run, o);
   if (!o.loop.dynamic) requireHeld(file.scene);
   if (o.loop.dynamic && !file.scene.rotation.angular_velocity.isZero(0))
-    throw SceneError("scene key 'rotation': is for -mode static, a scene at rest in a frame that turns; in dynamics let supports turn by their motion");
+    throw SceneError("scene key 'rotation': is for -mode static, a scene at rest in a frame that turns; in dynamics "
+                     "let supports turn by their motion");
   if (o.bifurcation && o.loop.bifurcation != Bifurcation::off && !file.scene.moments.empty())
-    throw SceneError("option -bifurcation: a scene with couples has no potential whose Hessian could tell stability; use off");
+    throw SceneError(
+        "option -bifurcation: a scene with couples has no potential whose Hessian could tell stability; use off");
   if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength) requireDeadLoads(file.scene);
   if (o.accuracy && o.accuracy->of == Quantity::tip)
     for (const Rod &rod : file.scene.rods)
-      if (rod.closed) throw SceneError("option -accuracy_of: rod '" + rod.name + "' is closed and has no tip; use position");
+      if (rod.closed)
+        throw SceneError("option -accuracy_of: rod '" + rod.name + "' is closed and has no tip; use position");
   if (o.accuracy || (o.error_estimate && !o.loop.dynamic)) {
     prepared.written = file.scene;
     prepared.drawings = file.drawings;
@@ -200,11 +212,13 @@ PetscErrorCode meetAccuracy(Prepared &prepared, Options &o, Choice *choice) {
 }
 
 /// The error of a static answer, told and written.
-PetscErrorCode tellError(const Prepared &prepared, double rounding_error, const std::vector<double> &critical, const Options &o, Progress &progress) {
+PetscErrorCode tellError(const Prepared &prepared, double rounding_error, const std::vector<double> &critical,
+                         const Options &o, Progress &progress) {
   PetscFunctionBeginUser;
   const Simulation &run = *prepared.run;
   Estimate estimate;
-  PetscCall(estimateError(run, rounding_error, critical, redraw(prepared.written, prepared.drawings, edgesOf(run.scene, 2)), o.loop, &estimate));
+  PetscCall(estimateError(run, rounding_error, critical,
+                          redraw(prepared.written, prepared.drawings, edgesOf(run.scene, 2)), o.loop, &estimate));
   for (const std::string &line : describe(estimate, run.scene)) progress.say(line);
   writeEstimate(o.output_dir + "/trajectory.h5", estimate);
   PetscFunctionReturn(0);
@@ -214,7 +228,8 @@ void tellTimeError(const Diagnostics &last, const Options &o, Progress &progress
   std::ostringstream line;
   const double with_rounding = last.error_estimate + last.rounding_error;
   line << "estimated error: " << std::setprecision(3) << with_rounding
-       << " rod lengths in time, the local errors of all steps and their rounding errors added up; that of the edges is not in it";
+       << " rod lengths in time, the local errors of all steps and their rounding errors added up; that of the edges "
+          "is not in it";
   progress.say(line.str());
   writeTimeError(o.output_dir + "/trajectory.h5", with_rounding);
 }
@@ -227,18 +242,22 @@ std::string textOf(const SceneSource &source) {
 
 bool isInside(const std::string &file, const std::string &folder) {
   std::error_code none;
-  const std::filesystem::path whole = std::filesystem::weakly_canonical(file, none), top = std::filesystem::weakly_canonical(folder, none);
+  const std::filesystem::path whole = std::filesystem::weakly_canonical(file, none),
+                              top = std::filesystem::weakly_canonical(folder, none);
   return std::mismatch(top.begin(), top.end(), whole.begin(), whole.end()).first == top.end();
 }
 
-/// Takes up the checkpoint that -restart asks for and makes room for the results. False where the run was complete already.
-bool takeUp(const Options &o, const OutputFolder &folder, const RunFacts &facts, Simulation &run, StepControl *control, std::vector<std::string> *told) {
+/// Takes up the checkpoint that -restart asks for and makes room for the results. False where the run was complete
+/// already.
+bool takeUp(const Options &o, const OutputFolder &folder, const RunFacts &facts, Simulation &run, StepControl *control,
+            std::vector<std::string> *told) {
   const bool automatic = o.restart == "auto";
   std::string from;
   bool changed = false;
   if (!o.restart.empty() && !o.loop.dynamic && o.loop.continuation == Continuation::arclength)
     throw SceneError("option -restart: -continuation arclength cannot be taken up again");
-  if (automatic && o.restart_time) throw SceneError("option -restart_time: -restart auto goes on at the time of its checkpoint");
+  if (automatic && o.restart_time)
+    throw SceneError("option -restart_time: -restart auto goes on at the time of its checkpoint");
   if (automatic) {
     for (const std::string &path : folder.checkpoints()) {
       try {
@@ -254,7 +273,8 @@ bool takeUp(const Options &o, const OutputFolder &folder, const RunFacts &facts,
                        "); to run from the start, without those results, take '-restart auto' away");
     if (from.empty()) told->push_back("-restart auto: no checkpoint in " + o.output_dir + ", from the start");
   } else if (!o.restart.empty()) {
-    from = std::filesystem::is_directory(o.restart) ? (std::filesystem::path(o.restart) / "checkpoint.h5").string() : o.restart;
+    from = std::filesystem::is_directory(o.restart) ? (std::filesystem::path(o.restart) / "checkpoint.h5").string()
+                                                    : o.restart;
     changed = readCheckpoint(from, &run, control, facts, told);
     if (isInside(from, o.output_dir))
       throw SceneError("option -restart: the results would replace those beside the checkpoint '" + from +
@@ -272,8 +292,9 @@ bool takeUp(const Options &o, const OutputFolder &folder, const RunFacts &facts,
     } else {
       std::ostringstream time;
       time << run.state.time;
-      throw SceneError("option -restart: the checkpoint is at " + std::string(o.loop.dynamic ? "time " : "load factor ") + time.str() +
-                       ", nothing is left to do" + (o.loop.dynamic ? "; write a larger -t_end, or another -restart_time" : ""));
+      throw SceneError("option -restart: the checkpoint is at " +
+                       std::string(o.loop.dynamic ? "time " : "load factor ") + time.str() + ", nothing is left to do" +
+                       (o.loop.dynamic ? "; write a larger -t_end, or another -restart_time" : ""));
     }
   }
   if (from.empty() || !automatic) {
@@ -297,13 +318,15 @@ std::size_t liveliest(const Simulation &run) {
     const RodRange &rod = run.elements->rods[r];
     double energy = 0;
     for (int i = 0; i < rod.vertices; ++i)
-      energy += 0.5 * run.elements->mass()[rod.slot(i)] * run.state.velocity[std::size_t(rod.first_vertex + i)].squaredNorm();
+      energy +=
+          0.5 * run.elements->mass()[rod.slot(i)] * run.state.velocity[std::size_t(rod.first_vertex + i)].squaredNorm();
     if (energy > largest) largest = energy, most = r;
   }
   return most;
 }
 
-PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequest::Clock::time_point begin, int *exit_code) {
+PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequest::Clock::time_point begin,
+                       int *exit_code) {
   PetscFunctionBeginUser;
   Options o;
   {
@@ -314,12 +337,15 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
     print(o.schema ? schemaAsJson() : keysAsJson());
     PetscFunctionReturn(0);
   }
-  if (o.scene.empty()) throw SceneError("option -scene: is required: tendril -scene data/scenes/helix.yaml (-help lists all options)");
+  if (o.scene.empty())
+    throw SceneError("option -scene: is required: tendril -scene data/scenes/helix.yaml (-help lists all options)");
   if (const std::string place = files.place("scene"); !place.empty() && !std::filesystem::exists(o.scene))
-    throw SceneError(place + ": the scene '" + o.scene + "' cannot be opened; its path begins in the folder where tendril is started");
+    throw SceneError(place + ": the scene '" + o.scene +
+                     "' cannot be opened; its path begins in the folder where tendril is started");
   int ranks;
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &ranks));
-  if (ranks > 1) throw SceneError("tendril runs on one process, found " + std::to_string(ranks) + "; start it without mpiexec");
+  if (ranks > 1)
+    throw SceneError("tendril runs on one process, found " + std::to_string(ranks) + "; start it without mpiexec");
   Prepared prepared;
   {
     const QuietErrors errors;
@@ -332,7 +358,8 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   inputs.insert(inputs.end(), prepared.source.paths.begin(), prepared.source.paths.end());
   for (const std::string &input : inputs)
     if (folder.replaces(input))
-      throw SceneError("option -output_dir: results would replace '" + input + "', which this run reads; choose another folder, or another name for that file");
+      throw SceneError("option -output_dir: results would replace '" + input +
+                       "', which this run reads; choose another folder, or another name for that file");
   Choice choice;
   if (o.accuracy) PetscCall(meetAccuracy(prepared, o, &choice));
   const StopRequest request(begin, o.time_limit); // before this, nothing is written: a signal ends the run at once
@@ -358,24 +385,30 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   for (const std::string &note : prepared.notes) progress.say(note);
   for (const std::string &line : choice.lines) progress.log(line);
 
-  auto writer = std::make_unique<TrajectoryWriter>(o.output_dir, run.scene, *run.elements, origin, o.fields, o.loop.dynamic);
+  auto writer =
+      std::make_unique<TrajectoryWriter>(o.output_dir, run.scene, *run.elements, origin, o.fields, o.loop.dynamic);
   TrajectoryWriter &trajectory = *writer;
   trajectory.writeFrame(run.state);
   trajectory.flushWhenDue();
   Diagnostics last;
   std::vector<double> critical_factors;
-  double next_output = o.output_interval > 0 ? o.output_interval * (1 + std::floor(run.state.time / o.output_interval * (1 + 1e-12))) : 0;
+  double next_output = o.output_interval > 0
+                           ? o.output_interval * (1 + std::floor(run.state.time / o.output_interval * (1 + 1e-12)))
+                           : 0;
   const std::string checkpoint = o.output_dir + "/checkpoint.h5";
   long steps = 0, iterations = 0, rejected = 0;
   bool warned = false;
   WidestAngle widest{pi / 6};
   widest.include(run.scene, *run.elements, run.state); // told above
   widest.rod = -1;
-  // Where energy rises by more than the work of loads and supports, the method has put it in: that is measured by the motion's own and by that work.
-  double dissipated = 0, gained = 0, work = 0, most_kinetic = 0, little = 0; // little: what rounding moves, 1e-9 of bending by one radian
+  // Where energy rises by more than the work of loads and supports, the method has put it in: that is measured by the
+  // motion's own and by that work.
+  double dissipated = 0, gained = 0, work = 0, most_kinetic = 0,
+         little = 0; // little: what rounding moves, 1e-9 of bending by one radian
   for (std::size_t r = 0; r < run.scene.rods.size(); ++r) {
     const Material &m = run.scene.rods[r].material;
-    const double length = run.potential->length(int(r)), stiff = std::max(m.flexural_stiffness[0], m.flexural_stiffness[1]);
+    const double length = run.potential->length(int(r)),
+                 stiff = std::max(m.flexural_stiffness[0], m.flexural_stiffness[1]);
     little += 1e-9 * (stiff > 0 ? stiff / length : 1e-6 * m.axial_stiffness * length);
   }
   const bool arclength = !o.loop.dynamic && o.loop.continuation == Continuation::arclength;
@@ -403,11 +436,14 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
     most_kinetic = std::max(most_kinetic, row.energy.kinetic);
     gained = std::max(gained, -dissipated);
     if (!o.loop.dynamic && row.negative_pivots > 0 && !warned) {
-      const std::string count = std::to_string(row.negative_pivots) + (row.negative_pivots == 1 ? " negative pivot" : " negative pivots");
-      progress.say(run.scene.moments.empty()
-                       ? "at load factor " + shortText(row.time) +
-                             " the path is unstable, as it is wherever negative_pivots in the diagnostics is not 0: " + count
-                       : "warning: " + count + " at an accepted state with couples: couples have no potential, so its stability is not known");
+      const std::string count =
+          std::to_string(row.negative_pivots) + (row.negative_pivots == 1 ? " negative pivot" : " negative pivots");
+      progress.say(
+          run.scene.moments.empty()
+              ? "at load factor " + shortText(row.time) +
+                    " the path is unstable, as it is wherever negative_pivots in the diagnostics is not 0: " + count
+              : "warning: " + count +
+                    " at an accepted state with couples: couples have no potential, so its stability is not known");
       warned = true;
     }
     PetscCall(PetscLogEventEnd(events().output, 0, 0, 0, 0));
@@ -417,7 +453,8 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   auto critical = [&](const CriticalPoint &point) -> PetscErrorCode {
     PetscFunctionBeginUser;
     std::ostringstream line;
-    line << (point.limit ? "limit point: " : "") << "critical load factor " << std::setprecision(10) << point.load_factor;
+    line << (point.limit ? "limit point: " : "") << "critical load factor " << std::setprecision(10)
+         << point.load_factor;
     progress.say(line.str());
     critical_factors.push_back(point.load_factor);
     trajectory.writeCritical(point.load_factor);
@@ -443,7 +480,8 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   const bool stopped = !finished && failure.empty();
   if (arclength && finished && run.state.time < o.loop.t_end && steps >= o.loop.arclength_steps) {
     std::ostringstream line;
-    line << "the path ends at load factor " << run.state.time << " after " << steps << " steps; to follow it on, raise -arclength_steps";
+    line << "the path ends at load factor " << run.state.time << " after " << steps
+         << " steps; to follow it on, raise -arclength_steps";
     progress.say(line.str());
   }
   if (stopped && trajectory.lastTime() < run.state.time) trajectory.writeFrame(run.state);
@@ -455,8 +493,9 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   PetscCall(PetscLogEventEnd(events().output, 0, 0, 0, 0));
   PetscCall(PetscLogStagePop());
   std::ostringstream summary;
-  summary << steps << " steps, " << iterations << " Newton iterations (mean " << std::setprecision(3) << (steps ? double(iterations) / double(steps) : 0)
-          << "), " << rejected << " rejected, " << last.wall_seconds << " s, results in " << o.output_dir;
+  summary << steps << " steps, " << iterations << " Newton iterations (mean " << std::setprecision(3)
+          << (steps ? double(iterations) / double(steps) : 0) << "), " << rejected << " rejected, " << last.wall_seconds
+          << " s, results in " << o.output_dir;
   progress.say(summary.str());
   for (const std::string &line : describe(at_end, run.scene)) progress.say(line);
   constexpr double most_gained = 0.5; // of what the motion's own energy and the work of loads and supports come to
@@ -464,9 +503,10 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   if (o.loop.dynamic && gained > 0.1 * moved + little) {
     std::ostringstream growth;
     growth << "the energy rose by " << std::setprecision(2) << gained / moved << " of the largest kinetic energy"
-           << (work > 0 ? " and the work of loads and supports" : "") << " (at most " << most_gained << " passes), with nothing to put it in but -integrator "
-           << o.loop.integrator.name << " in steps too long for it: shorten -dt, or take bdf2 or energy_momentum; " << labelOf(run.scene.rods[liveliest(run)])
-           << " moves most";
+           << (work > 0 ? " and the work of loads and supports" : "") << " (at most " << most_gained
+           << " passes), with nothing to put it in but -integrator " << o.loop.integrator.name
+           << " in steps too long for it: shorten -dt, or take bdf2 or energy_momentum; "
+           << labelOf(run.scene.rods[liveliest(run)]) << " moves most";
     // A method that is unstable has made most of the motion itself.
     if (finished && gained > most_gained * moved + little) {
       finished = false;
@@ -476,19 +516,22 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   }
   if (widest.rod >= 0) {
     std::ostringstream line;
-    line << "warning: neighbouring edges of rod '" << run.scene.rods[std::size_t(widest.rod)].name << "' came to turn or twist by up to "
-         << std::setprecision(3) << widest.angle * 180 / pi << " degrees, at vertex " << widest.vertex << " and " << (o.loop.dynamic ? "time " : "load factor ")
+    line << "warning: neighbouring edges of rod '" << run.scene.rods[std::size_t(widest.rod)].name
+         << "' came to turn or twist by up to " << std::setprecision(3) << widest.angle * 180 / pi
+         << " degrees, at vertex " << widest.vertex << " and " << (o.loop.dynamic ? "time " : "load factor ")
          << widest.time << "; measure tan is stiffer than the rod above 30: use more edges, or -rod_measure angle";
     progress.say(line.str());
   }
   if (last.rounding_error > 0) {
     std::ostringstream rounding;
-    rounding << "rounding error: " << std::setprecision(2) << last.rounding_error << " of the rod length" << (o.loop.dynamic ? ", summed over the steps" : "");
+    rounding << "rounding error: " << std::setprecision(2) << last.rounding_error << " of the rod length"
+             << (o.loop.dynamic ? ", summed over the steps" : "");
     progress.say(rounding.str());
   }
   if (stopped) {
     std::ostringstream line;
-    line << "stopped by " << request.reason() << " at " << (o.loop.dynamic ? "time " : "load factor ") << run.state.time << " of " << o.loop.t_end;
+    line << "stopped by " << request.reason() << " at " << (o.loop.dynamic ? "time " : "load factor ") << run.state.time
+         << " of " << o.loop.t_end;
     if (arclength)
       line << "; a path of equilibria cannot be gone on with";
     else
@@ -501,7 +544,8 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   }
   writer.reset();
   if (finished && o.error_estimate && o.loop.dynamic) tellTimeError(last, o, progress);
-  if (finished && o.error_estimate && !o.loop.dynamic) PetscCall(tellError(prepared, last.rounding_error, critical_factors, o, progress));
+  if (finished && o.error_estimate && !o.loop.dynamic)
+    PetscCall(tellError(prepared, last.rounding_error, critical_factors, o, progress));
   PetscFunctionReturn(0);
 }
 
@@ -524,7 +568,9 @@ int runMain(int count, char **arguments) {
   const KeptSignals signals;
   std::signal(SIGXFSZ, SIG_IGN); // a file that grows beyond its limit cannot be written: that is told
   // Ours before PETSc's, which come only where solvers are set up for a scene.
-  auto given = [&](const char *option) { return std::any_of(argv + 1, argv + argc, [&](const char *word) { return std::string_view(word) == option; }); };
+  auto given = [&](const char *option) {
+    return std::any_of(argv + 1, argv + argc, [&](const char *word) { return std::string_view(word) == option; });
+  };
   try {
     if (given("--version")) return print(versionText() + "\n"), 0;
     if (given("-help") || given("-h") || given("--help")) {
@@ -561,7 +607,8 @@ int runMain(int count, char **arguments) {
   } catch (const std::exception &e) {
     int rank;
     MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
-    const std::string message = dynamic_cast<const std::bad_alloc *>(&e) ? "there is not enough memory for this scene" : files.locate(e.what());
+    const std::string message =
+        dynamic_cast<const std::bad_alloc *>(&e) ? "there is not enough memory for this scene" : files.locate(e.what());
     if (rank == 0) std::fprintf(stderr, "tendril: %s\n", printable(message).c_str());
     exit_code = 1;
     if (dynamic_cast<const WriteError *>(&e)) {

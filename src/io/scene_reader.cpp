@@ -32,7 +32,8 @@ std::vector<Polyline> readShape(YamlMap &rod, double *least_edges) {
   }
   if (rod.has("rods[].ring") && ++given) {
     YamlMap m(rod.at("rods[].ring"), "rods[].ring");
-    shapes = {ringShape(m.vector("rods[].ring.center"), unit(m.at("rods[].ring.normal")), m.number("rods[].ring.radius"), m.integer("rods[].ring.edges"))};
+    shapes = {ringShape(m.vector("rods[].ring.center"), unit(m.at("rods[].ring.normal")),
+                        m.number("rods[].ring.radius"), m.integer("rods[].ring.edges"))};
     m.finish();
   }
   if (rod.has("rods[].helix") && ++given) {
@@ -42,7 +43,8 @@ std::vector<Polyline> readShape(YamlMap &rod, double *least_edges) {
     h.axis = unit(m.at("rods[].helix.axis"));
     h.start = m.has("rods[].helix.start") ? unit(m.at("rods[].helix.start")) : anyNormal(h.axis);
     if (std::abs(h.start.dot(h.axis)) > 1e-6)
-      m.at("rods[].helix.start").fail("'start' must be normal to 'axis', found a cosine of " + std::to_string(h.start.dot(h.axis)));
+      m.at("rods[].helix.start")
+          .fail("'start' must be normal to 'axis', found a cosine of " + std::to_string(h.start.dot(h.axis)));
     h.length = m.number("rods[].helix.length");
     h.radius = m.number("rods[].helix.radius");
     h.turns = m.number("rods[].helix.turns");
@@ -50,8 +52,9 @@ std::vector<Polyline> readShape(YamlMap &rod, double *least_edges) {
     h.edges = m.integer("rods[].helix.edges");
     *least_edges = h.leastEdges();
     if (h.edges < h.leastEdges())
-      m.at("rods[].helix.edges").fail("a helix of " + shortText(h.turns) + " turns needs at least " + shortText(h.leastEdges()) + " edges, found " +
-                                      std::to_string(h.edges));
+      m.at("rods[].helix.edges")
+          .fail("a helix of " + shortText(h.turns) + " turns needs at least " + shortText(h.leastEdges()) +
+                " edges, found " + std::to_string(h.edges));
     shapes = {helixShape(h)};
     m.finish();
   }
@@ -63,14 +66,18 @@ std::vector<Polyline> readShape(YamlMap &rod, double *least_edges) {
   if (rod.has("rods[].file") && ++given) {
     const YamlValue v = rod.at("rods[].file");
     const std::filesystem::path path(v.text());
-    if (path.string() != inOneLine(path.string())) v.fail("'file' must be in one line, found '" + inOneLine(path.string()) + "'");
+    if (path.string() != inOneLine(path.string()))
+      v.fail("'file' must be in one line, found '" + inOneLine(path.string()) + "'");
     try {
-      shapes = readPolylines(path.is_absolute() ? path.string() : (std::filesystem::path(v.file()).parent_path() / path).string());
+      shapes = readPolylines(path.is_absolute() ? path.string()
+                                                : (std::filesystem::path(v.file()).parent_path() / path).string());
     } catch (const SceneError &e) {
       v.fail(e.what());
     }
   }
-  if (given != 1) rod.value().fail("a rod needs exactly one shape: line, ring, helix, points or file; found " + std::to_string(given));
+  if (given != 1)
+    rod.value().fail("a rod needs exactly one shape: line, ring, helix, points or file; found " +
+                     std::to_string(given));
   return shapes;
 }
 
@@ -80,7 +87,8 @@ void place(const YamlValue &value, std::vector<Polyline> &shapes) {
   const Vec3 rotation = map.vector("rods[].place.rotation"), translation = map.vector("rods[].place.translation");
   map.finish();
   const double angle = rotation.norm();
-  const Eigen::Matrix3d turn = angle > 0 ? Eigen::Matrix3d(Eigen::AngleAxisd(angle, rotation / angle)) : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
+  const Eigen::Matrix3d turn = angle > 0 ? Eigen::Matrix3d(Eigen::AngleAxisd(angle, rotation / angle))
+                                         : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
   auto placed = [=](const Vec3 &x) { return Vec3(turn * (scale * x) + translation); };
   for (Polyline &shape : shapes) {
     for (Vec3 &x : shape.points) x = placed(x);
@@ -93,12 +101,13 @@ void readDirectors(YamlMap &map, Rod &rod) {
     const YamlValue list = map.at("rods[].directors");
     const auto items = list.items();
     if (int(items.size()) != rod.edges())
-      list.fail("'directors' must have one vector per edge (" + std::to_string(rod.edges()) + "), found " + std::to_string(items.size()));
+      list.fail("'directors' must have one vector per edge (" + std::to_string(rod.edges()) + "), found " +
+                std::to_string(items.size()));
     for (int i = 0; i < rod.edges(); ++i) {
       const Vec3 d = unit(items[i]), t = rod.edge(i).normalized();
       if (std::abs(d.dot(t)) > 1e-6)
-        items[i].fail("director " + std::to_string(i) + " is not normal to its edge (cosine " + std::to_string(d.dot(t)) +
-                      "); take away its part along the edge");
+        items[i].fail("director " + std::to_string(i) + " is not normal to its edge (cosine " +
+                      std::to_string(d.dot(t)) + "); take away its part along the edge");
       rod.director.push_back(orthonormalised(d, t));
     }
     return;
@@ -109,13 +118,16 @@ void readDirectors(YamlMap &map, Rod &rod) {
     start = unit(v);
     const double cosine = start.dot(rod.edge(0).normalized());
     if (std::abs(cosine) > 1e-6)
-      v.fail("'director' is not normal to the first edge (cosine " + std::to_string(cosine) + "); take away its part along the edge");
+      v.fail("'director' is not normal to the first edge (cosine " + std::to_string(cosine) +
+             "); take away its part along the edge");
   }
   setBishopDirectors(rod, start);
 }
 
 /// Rods of one block of the scene share its name and add a number.
-bool isNamed(const Rod &rod, const std::string &name) { return rod.name == name || rod.name.rfind(name + ".", 0) == 0 || rod.name.rfind(name + "#", 0) == 0; }
+bool isNamed(const Rod &rod, const std::string &name) {
+  return rod.name == name || rod.name.rfind(name + ".", 0) == 0 || rod.name.rfind(name + "#", 0) == 0;
+}
 
 void readNatural(YamlMap &map, Rod &rod) {
   const YamlValue v = map.at("rods[].natural");
@@ -131,10 +143,13 @@ void readNatural(YamlMap &map, Rod &rod) {
 
 /// Name of a rod, by which supports and loads may find it without doubt.
 std::string readName(YamlMap &map, const std::vector<Rod> &rods) {
-  auto isTaken = [&](const std::string &name) { return std::any_of(rods.begin(), rods.end(), [&](const Rod &rod) { return isNamed(rod, name); }); };
+  auto isTaken = [&](const std::string &name) {
+    return std::any_of(rods.begin(), rods.end(), [&](const Rod &rod) { return isNamed(rod, name); });
+  };
   if (!map.has("rods[].name")) {
     const std::string name = "rod" + std::to_string(rods.size());
-    if (isTaken(name)) map.value().fail("a rod without a name is '" + name + "', and there is one already; give this rod a 'name'");
+    if (isTaken(name))
+      map.value().fail("a rod without a name is '" + name + "', and there is one already; give this rod a 'name'");
     return name;
   }
   const YamlValue v = map.at("rods[].name");
@@ -150,7 +165,8 @@ std::string readName(YamlMap &map, const std::vector<Rod> &rods) {
 /// Of all blocks of rods.
 struct Sums {
   double vertices = 0;
-  std::map<std::string, std::vector<std::string>> defaults; ///< names of the blocks that take the same parameters by default
+  std::map<std::string, std::vector<std::string>>
+      defaults; ///< names of the blocks that take the same parameters by default
 };
 
 void readRod(const YamlValue &value, const Overrides &overrides, SceneFile &out, Sums &sums) {
@@ -185,9 +201,11 @@ void readRod(const YamlValue &value, const Overrides &overrides, SceneFile &out,
     m.finish();
   }
   for (const Polyline &shape : shapes) sums.vertices += double(copies) * double(shape.points.size());
-  if (sums.vertices > 1e8) value.fail("this makes " + std::to_string(std::int64_t(sums.vertices)) + " vertices; a scene may have 1e8");
+  if (sums.vertices > 1e8)
+    value.fail("this makes " + std::to_string(std::int64_t(sums.vertices)) + " vertices; a scene may have 1e8");
   for (const Polyline &shape : shapes)
-    if (shape.closed && map.has("rods[].closed") && !closed) map.at("rods[].closed").fail("'closed: false' contradicts the shape, which is closed");
+    if (shape.closed && map.has("rods[].closed") && !closed)
+      map.at("rods[].closed").fail("'closed: false' contradicts the shape, which is closed");
   for (int copy = 0; copy < copies; ++copy)
     for (std::size_t k = 0; k < shapes.size(); ++k) {
       Rod rod = common;
@@ -205,13 +223,17 @@ void readRod(const YamlValue &value, const Overrides &overrides, SceneFile &out,
       readDirectors(map, rod);
       if (rod.closed && rod.initial_turns != std::round(rod.initial_turns))
         map.at("rods[].turns").fail("'turns' of a closed rod must be a whole number, or its ends do not meet");
-      if (rod.material.isCable() && rod.initial_turns != 0) map.at("rods[].turns").fail("a rod without flexural stiffness has no twist");
+      if (rod.material.isCable() && rod.initial_turns != 0)
+        map.at("rods[].turns").fail("a rod without flexural stiffness has no twist");
       rods.push_back(rod);
       Drawing &drawing = out.drawings.emplace_back();
       drawing.directors_given = map.has("rods[].directors");
       drawing.least_edges = least_edges;
-      if (rod.closed == shapes[k].closed && shapes[k].curve) // a curve that `closed` closes by one more edge is points to us
-        drawing.curve = [curve = shapes[k].curve, shift = Vec3(double(copy) * offset)](double s) { return Vec3(curve(s) + shift); };
+      if (rod.closed == shapes[k].closed &&
+          shapes[k].curve) // a curve that `closed` closes by one more edge is points to us
+        drawing.curve = [curve = shapes[k].curve, shift = Vec3(double(copy) * offset)](double s) {
+          return Vec3(curve(s) + shift);
+        };
     }
   map.finish();
 }
@@ -225,7 +247,9 @@ std::vector<int> readTargets(YamlMap &map, KeyOf<KeyType::rod> key, const std::v
   const YamlValue v = map.at(*key);
   const std::string word = v.text();
   const std::vector<int> found = rodsOf(rods, word);
-  if (found.empty()) v.fail("there is no rod '" + word + "'; write the name of a rod, its number from 0 to " + std::to_string(rods.size() - 1) + ", or all");
+  if (found.empty())
+    v.fail("there is no rod '" + word + "'; write the name of a rod, its number from 0 to " +
+           std::to_string(rods.size() - 1) + ", or all");
   return found;
 }
 
@@ -234,8 +258,8 @@ int readIndex(YamlMap &map, KeyOf<KeyType::index> key, int count, const std::str
   if (v.isScalar() && v.node().Scalar() == "last") return count - 1;
   const int i = v.integer(*key);
   if (i >= count)
-    v.fail("'" + v.name() + "' " + std::to_string(i) + " is out of range: rod '" + rod + "' has " + std::to_string(count) + ", numbered 0 to " +
-           std::to_string(count - 1));
+    v.fail("'" + v.name() + "' " + std::to_string(i) + " is out of range: rod '" + rod + "' has " +
+           std::to_string(count) + ", numbered 0 to " + std::to_string(count - 1));
   return i;
 }
 
@@ -244,7 +268,8 @@ Motion readMotion(const YamlValue &value) {
   Motion m;
   m.velocity = map.vector("supports[].motion.velocity");
   m.angular_velocity = map.vector("supports[].motion.angular_velocity");
-  const bool steady = map.has("supports[].motion.velocity") || map.has("supports[].motion.angular_velocity"), table = map.has("supports[].motion.table");
+  const bool steady = map.has("supports[].motion.velocity") || map.has("supports[].motion.angular_velocity"),
+             table = map.has("supports[].motion.table");
   if (!steady && !table) value.fail("'motion' needs 'velocity' and/or 'angular_velocity', or a 'table'");
   if (table) {
     if (steady) value.fail("'motion' takes a 'table' or velocities, not both");
@@ -254,7 +279,8 @@ Motion readMotion(const YamlValue &value) {
       const std::vector<double> v = row.numbers(n);
       m.table.push_back({v[0], Vec3(v[1], v[2], v[3]), n == 7 ? Vec3(v[4], v[5], v[6]) : Vec3(Vec3::Zero())});
       if (m.table.size() > 1 && m.table[m.table.size() - 2].time >= v[0])
-        row.fail("the times of 'table' must increase, found " + std::to_string(v[0]) + " after " + std::to_string(m.table[m.table.size() - 2].time));
+        row.fail("the times of 'table' must increase, found " + std::to_string(v[0]) + " after " +
+                 std::to_string(m.table[m.table.size() - 2].time));
     }
     if (m.table.empty()) value.fail("'table' is empty");
   }
@@ -267,7 +293,8 @@ std::string jumpOf(const Motion &motion, const std::string &rod) {
   const double away = motion.displacementAt(0).norm(), turned = motion.rotationVectorAt(0).norm();
   if (away == 0 && turned == 0) return {};
   std::ostringstream s;
-  s << "the motion begins " << away << " m and " << turned << " rad away from rod '" << rod << "' as drawn, which jumps there in the first step";
+  s << "the motion begins " << away << " m and " << turned << " rad away from rod '" << rod
+    << "' as drawn, which jumps there in the first step";
   return s.str();
 }
 
@@ -283,7 +310,8 @@ void readSupport(const YamlValue &value, SceneFile &out) {
     s.rod = r;
     s.vertex = readIndex(map, "supports[].vertex", rod.vertices(), rod.name);
     for (const Support &other : scene.supports)
-      if (other.rod == r && other.vertex == s.vertex && ((other.holdsPosition() && s.holdsPosition()) || (other.holdsTwist() && s.holdsTwist())))
+      if (other.rod == r && other.vertex == s.vertex &&
+          ((other.holdsPosition() && s.holdsPosition()) || (other.holdsTwist() && s.holdsTwist())))
         value.fail("vertex " + std::to_string(s.vertex) + " of rod '" + rod.name + "' is held twice");
     s.frame = frameAtVertex(rod, s.vertex);
     if (type != "pin") {
@@ -299,11 +327,14 @@ void readSupport(const YamlValue &value, SceneFile &out) {
       }
       for (const int edge : {rod.edgeBefore(s.vertex), rod.edgeAfter(s.vertex)})
         if (type == "clamp" && edge >= 0 && s.frame.tangent.dot(rod.edge(edge).normalized()) < -0.9999)
-          map.at("supports[].tangent").fail("'tangent' points against edge " + std::to_string(edge) + " of rod '" + rod.name +
-                                            "', which would fold back on itself; tangents point from vertex to vertex, by their numbers");
-      if (!s.frame.director.allFinite()) value.fail("'tangent' is parallel to the rod's director; give a 'director' too");
+          map.at("supports[].tangent")
+              .fail("'tangent' points against edge " + std::to_string(edge) + " of rod '" + rod.name +
+                    "', which would fold back on itself; tangents point from vertex to vertex, by their numbers");
+      if (!s.frame.director.allFinite())
+        value.fail("'tangent' is parallel to the rod's director; give a 'director' too");
     }
-    if (type == "fix_twist" && rod.material.isCable()) value.fail("rod '" + rod.name + "' has no flexural stiffness and no twist to fix");
+    if (type == "fix_twist" && rod.material.isCable())
+      value.fail("rod '" + rod.name + "' has no flexural stiffness and no twist to fix");
     if (map.has("supports[].motion")) {
       const YamlValue motion = map.at("supports[].motion");
       s.motion = readMotion(motion);
@@ -331,15 +362,18 @@ void readLoad(const YamlValue &value, SceneFile &out) {
   for (const int r : readTargets(map, "loads[].rod", scene.rods)) {
     const Rod &rod = scene.rods[r];
     if (map.has("loads[].force")) {
-      const NodalForce &load = scene.forces.emplace_back(r, readIndex(map, "loads[].vertex", rod.vertices(), rod.name), map.vector("loads[].force"));
-      const bool held = std::any_of(scene.supports.begin(), scene.supports.end(),
-                                    [&](const Support &s) { return s.rod == r && s.vertex == load.vertex && s.holdsPosition(); });
+      const NodalForce &load = scene.forces.emplace_back(r, readIndex(map, "loads[].vertex", rod.vertices(), rod.name),
+                                                         map.vector("loads[].force"));
+      const bool held = std::any_of(scene.supports.begin(), scene.supports.end(), [&](const Support &s) {
+        return s.rod == r && s.vertex == load.vertex && s.holdsPosition();
+      });
       if (held && !warned && !load.force.isZero(0))
-        out.notes.push_back("warning: " + value.place() + ": the force acts on vertex " + std::to_string(load.vertex) + " of rod '" + rod.name +
-                            "', which a support holds: it moves nothing");
+        out.notes.push_back("warning: " + value.place() + ": the force acts on vertex " + std::to_string(load.vertex) +
+                            " of rod '" + rod.name + "', which a support holds: it moves nothing");
       warned = warned || held;
     } else if (map.has("loads[].torque") || map.has("loads[].moment")) {
-      if (rod.material.isCable()) value.fail("rod '" + rod.name + "' has no flexural stiffness: it cannot carry a torque or moment");
+      if (rod.material.isCable())
+        value.fail("rod '" + rod.name + "' has no flexural stiffness: it cannot carry a torque or moment");
       EdgeMoment m{r, readIndex(map, "loads[].edge", rod.edges(), rod.name), 0, Vec3::Zero()};
       if (map.has("loads[].torque")) m.torque = map.number("loads[].torque");
       if (map.has("loads[].moment")) m.moment = map.vector("loads[].moment");
@@ -373,8 +407,10 @@ void keepFiles(const YamlValue &rods, SceneSource &source) {
     const std::string path = node.Scalar();
     const std::filesystem::path place = std::filesystem::path(rods.file()).parent_path() / path;
     source.paths.push_back(place.string());
-    const bool seen = std::any_of(source.files.begin(), source.files.end(), [&](const auto &file) { return file.first == path; });
-    if (!seen && isTextPolyline(place.string())) source.files.emplace_back(path, contentOf(place, ": cannot be read again"));
+    const bool seen =
+        std::any_of(source.files.begin(), source.files.end(), [&](const auto &file) { return file.first == path; });
+    if (!seen && isTextPolyline(place.string()))
+      source.files.emplace_back(path, contentOf(place, ": cannot be read again"));
   }
 }
 
@@ -392,8 +428,11 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
   if (std::filesystem::is_directory(path)) throw SceneError(path + ": is a folder; give a scene file with -scene");
   out.source.text = readText(path, ": cannot be opened; give an existing scene file with -scene");
   const std::vector<YAML::Node> documents = loadYaml(out.source.text, path);
-  if (documents.empty() || documents[0].IsNull()) throw SceneError(path + ":1: is empty; a scene needs at least 'rods'");
-  if (documents.size() > 1) throw SceneError(path + ":" + std::to_string(documents[1].Mark().line + 1) + ": a second document begins here; a scene is one");
+  if (documents.empty() || documents[0].IsNull())
+    throw SceneError(path + ":1: is empty; a scene needs at least 'rods'");
+  if (documents.size() > 1)
+    throw SceneError(path + ":" + std::to_string(documents[1].Mark().line + 1) +
+                     ": a second document begins here; a scene is one");
   YamlMap map(YamlValue(documents[0], path, "scene"));
   out.scene.gravity = map.vector("gravity");
   if (map.has("rotation")) {
@@ -406,7 +445,8 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
   Sums sums;
   for (const YamlValue &v : map.at("rods").items()) readRod(v, overrides, out, sums);
   for (const auto &[values, names] : sums.defaults)
-    out.notes.push_back(values + " (rod '" + names[0] + "'" + (names.size() > 1 ? " and " + std::to_string(names.size() - 1) + " more" : "") + ")");
+    out.notes.push_back(values + " (rod '" + names[0] + "'" +
+                        (names.size() > 1 ? " and " + std::to_string(names.size() - 1) + " more" : "") + ")");
   if (out.scene.rods.empty()) map.at("rods").fail("a scene needs at least one rod");
   if (map.has("supports"))
     for (const YamlValue &v : map.at("supports").items()) readSupport(v, out);

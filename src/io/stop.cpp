@@ -44,9 +44,13 @@ StopRequest::~StopRequest() {
   for (const auto &[signal, action] : before_) sigaction(signal, &action, nullptr);
 }
 
-bool StopRequest::asked() const { return caught != 0 || (limit_ && std::chrono::duration<double>(Clock::now() - begin_).count() >= *limit_); }
+bool StopRequest::asked() const {
+  return caught != 0 || (limit_ && std::chrono::duration<double>(Clock::now() - begin_).count() >= *limit_);
+}
 
-std::string StopRequest::reason() const { return caught == SIGINT ? "SIGINT" : caught == SIGTERM ? "SIGTERM" : "-time_limit"; }
+std::string StopRequest::reason() const {
+  return caught == SIGINT ? "SIGINT" : caught == SIGTERM ? "SIGTERM" : "-time_limit";
+}
 
 int StopRequest::exitCode() const { return caught != 0 ? 128 + int(caught) : 75; }
 

@@ -51,7 +51,8 @@ Summary summarize(const Scene &scene, const Elements &elements, const State &sta
   for (std::size_t s = 0; s < scene.supports.size(); ++s) {
     const Support &support = scene.supports[s];
     out.total_force += out.force[s];
-    out.total_moment += state.position[elements.rods[support.rod].first_vertex + support.vertex].cross(out.force[s]) + out.moment[s];
+    out.total_moment +=
+        state.position[elements.rods[support.rod].first_vertex + support.vertex].cross(out.force[s]) + out.moment[s];
   }
   return out;
 }
@@ -67,7 +68,8 @@ std::vector<std::string> describe(const Summary &s, const Scene &scene) {
     if (e.rod < 0) return;
     std::ostringstream value;
     value << std::setprecision(5) << e.value * scale << ' ' << unit;
-    row(name, value.str(), std::string(place) + " " + std::to_string(e.at) + " of rod '" + scene.rods[std::size_t(e.rod)].name + "'");
+    row(name, value.str(),
+        std::string(place) + " " + std::to_string(e.at) + " of rod '" + scene.rods[std::size_t(e.rod)].name + "'");
   };
   lines.push_back("at the end, largest values and where:");
   largest("displacement", s.displacement, 1, "m", "vertex");
@@ -78,13 +80,16 @@ std::vector<std::string> describe(const Summary &s, const Scene &scene) {
   mass << std::setprecision(5) << s.mass << " kg";
   row("mass", mass.str(), "centre " + textOf(s.centre_of_mass, "m"));
   const char *name = "reactions";
-  if (scene.supports.size() > 1) row(std::exchange(name, ""), textOf(s.total_force, "N") + " in all; about the origin " + textOf(s.total_moment, "N m"), "");
+  if (scene.supports.size() > 1)
+    row(std::exchange(name, ""),
+        textOf(s.total_force, "N") + " in all; about the origin " + textOf(s.total_moment, "N m"), "");
   for (std::size_t k = 0; k < scene.supports.size() && scene.supports.size() <= most_supports_told; ++k) {
     const Support &support = scene.supports[k];
     std::string what = support.holdsPosition() ? textOf(s.force[k], "N") : "";
     if (support.holdsTwist()) what += (what.empty() ? "" : ", ") + textOf(s.moment[k], "N m");
     row(std::exchange(name, ""),
-        what + ": " + nameOf(support.kind) + " at vertex " + std::to_string(support.vertex) + " of rod '" + scene.rods[std::size_t(support.rod)].name + "'",
+        what + ": " + nameOf(support.kind) + " at vertex " + std::to_string(support.vertex) + " of rod '" +
+            scene.rods[std::size_t(support.rod)].name + "'",
         "");
   }
   return lines;

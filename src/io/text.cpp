@@ -17,7 +17,8 @@ int characterLength(const std::string &text, std::size_t at) {
   const int length = first < 0xC2 ? 0 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : first < 0xF5 ? 4 : 0;
   for (int k = 1; k < length; ++k)
     if ((byte(at + std::size_t(k)) & 0xC0) != 0x80) return 0;
-  const bool control = first == 0xC2 && second < 0xA0, longer = (first == 0xE0 && second < 0xA0) || (first == 0xF0 && second < 0x90),
+  const bool control = first == 0xC2 && second < 0xA0,
+             longer = (first == 0xE0 && second < 0xA0) || (first == 0xF0 && second < 0x90),
              surrogate = first == 0xED && second > 0x9F, beyond = first == 0xF4 && second > 0x8F;
   return control || longer || surrogate || beyond ? 0 : length;
 }
@@ -41,7 +42,9 @@ std::string readBytes(const std::string &path, const std::string &missing, std::
     file.read(text.data() + size, piece);
     text.resize(size + std::size_t(file.gcount()));
   }
-  if (text.size() > most) throw SceneError(path + ": has more than " + std::to_string(most) + " bytes, which are not read; write points into polyline files");
+  if (text.size() > most)
+    throw SceneError(path + ": has more than " + std::to_string(most) +
+                     " bytes, which are not read; write points into polyline files");
   return text.starts_with(mark) ? text.substr(mark.size()) : text;
 }
 
@@ -51,8 +54,9 @@ std::string readText(const std::string &path, const std::string &missing) {
   for (std::size_t k = 0; k < text.size();) {
     const int length = text[k] == '\r' ? 1 : characterLength(text, k);
     if (length == 0)
-      throw SceneError(path + ":" + std::to_string(1 + std::count(text.begin(), text.begin() + std::ptrdiff_t(k), '\n')) + ": the byte 0x" + inHex(text[k]) +
-                       " is no text; save the file as UTF-8");
+      throw SceneError(path + ":" +
+                       std::to_string(1 + std::count(text.begin(), text.begin() + std::ptrdiff_t(k), '\n')) +
+                       ": the byte 0x" + inHex(text[k]) + " is no text; save the file as UTF-8");
     k += std::size_t(length);
   }
   return text;

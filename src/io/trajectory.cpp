@@ -40,14 +40,18 @@ const Field fields[] = {
     {"axial_force", "N", On::edges, 1, From::state, [](const Snapshot &s) { return s.state.axial_force.data(); }},
     // Measure `angle`: 2 pi x whole turns of each cell's twist [rad].
     {"turns", "rad", On::cells, 1, From::state, [](const Snapshot &s) { return s.state.turns.data(); }},
-    {"position_low", "m", On::vertices, 3, From::second_word, [](const Snapshot &s) { return s.state.position_low[0].data(); }},
-    {"curvature", "1/m", On::vertices, 2, From::strains, [](const Snapshot &s) { return s.strains.curvature[0].data(); }},
+    {"position_low", "m", On::vertices, 3, From::second_word,
+     [](const Snapshot &s) { return s.state.position_low[0].data(); }},
+    {"curvature", "1/m", On::vertices, 2, From::strains,
+     [](const Snapshot &s) { return s.strains.curvature[0].data(); }},
     {"twist", "rad/m", On::vertices, 1, From::strains, [](const Snapshot &s) { return s.strains.twist.data(); }},
-    {"strain_energy_density", "J/m", On::vertices, 1, From::strains, [](const Snapshot &s) { return s.strains.strain_energy_density.data(); }},
+    {"strain_energy_density", "J/m", On::vertices, 1, From::strains,
+     [](const Snapshot &s) { return s.strains.strain_energy_density.data(); }},
     {"force", "N", On::edges, 3, From::actions, [](const Snapshot &s) { return s.actions.force[0].data(); }},
     {"moment", "N m", On::vertices, 3, From::actions, [](const Snapshot &s) { return s.actions.moment[0].data(); }},
     {"reaction", "N", On::supports, 3, From::actions, [](const Snapshot &s) { return s.actions.reaction[0].data(); }},
-    {"reaction_moment", "N m", On::supports, 3, From::actions, [](const Snapshot &s) { return s.actions.reaction_moment[0].data(); }},
+    {"reaction_moment", "N m", On::supports, 3, From::actions,
+     [](const Snapshot &s) { return s.actions.reaction_moment[0].data(); }},
 };
 
 std::vector<std::string> namesOf(bool derived) {
@@ -60,7 +64,9 @@ std::vector<std::string> namesOf(bool derived) {
 constexpr auto patience = std::chrono::milliseconds(500); ///< how long rows and frames may wait
 constexpr std::size_t most_waiting = 4 << 20;             ///< [bytes]
 
-std::array<int, 4> sizes(const Elements &e) { return {e.vertices(), e.edges(), int(e.cell_slot.size()), int(e.support_slot.size())}; }
+std::array<int, 4> sizes(const Elements &e) {
+  return {e.vertices(), e.edges(), int(e.cell_slot.size()), int(e.support_slot.size())};
+}
 
 const char *nameOf(SectionShape shape) {
   switch (shape) {
@@ -74,8 +80,8 @@ const char *nameOf(SectionShape shape) {
   return "none";
 }
 
-/// Radius of a tube that stands for a rod: the mean of the half axes, or without a section that of a homogeneous round rod of its stiffnesses; 0 for
-/// a cable.
+/// Radius of a tube that stands for a rod: the mean of the half axes, or without a section that of a homogeneous round
+/// rod of its stiffnesses; 0 for a cable.
 double radiusOf(const Material &m) {
   if (m.section) return (m.section->halfAxes()[0] + m.section->halfAxes()[1]) / 2;
   return 2 * std::sqrt((m.flexural_stiffness[0] + m.flexural_stiffness[1]) / 2 / m.axial_stiffness);
@@ -93,10 +99,11 @@ const std::vector<std::string> &TrajectoryWriter::derivedFieldNames() {
   return names;
 }
 
-TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene, const Elements &elements, const Provenance &provenance,
-                                   const std::set<std::string> &wanted, bool dynamic)
-    : scene_(scene), elements_(elements), dynamic_(dynamic), folder_(folder), rods_(elements.rods.size()), vertices_(elements.vertices()),
-      edges_(elements.edges()), csv_(folder + "/diagnostics.csv"), file_(Hdf5File::create(folder + "/trajectory.h5")) {
+TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene, const Elements &elements,
+                                   const Provenance &provenance, const std::set<std::string> &wanted, bool dynamic)
+    : scene_(scene), elements_(elements), dynamic_(dynamic), folder_(folder), rods_(elements.rods.size()),
+      vertices_(elements.vertices()), edges_(elements.edges()), csv_(folder + "/diagnostics.csv"),
+      file_(Hdf5File::create(folder + "/trajectory.h5")) {
   for (const DiagnosticsColumn &column : diagnosticsColumns()) {
     if (!csv_rows_.empty()) csv_rows_ += ',';
     csv_rows_ += column.name;
@@ -107,7 +114,9 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
   for (const Field &f : fields) {
     state_.push_back(nullptr);
     if (std::string(f.name) != "position" && !wanted.count(f.name)) continue;
-    if (f.place == On::cells && std::find(elements.measure.begin(), elements.measure.end(), Measure::angle) == elements.measure.end()) continue;
+    if (f.place == On::cells &&
+        std::find(elements.measure.begin(), elements.measure.end(), Measure::angle) == elements.measure.end())
+      continue;
     std::vector<hsize_t> slab{hsize_t(sizes(elements)[std::size_t(f.place)])};
     if (slab[0] == 0) continue; // cables have no cells, free rods no supports
     if (f.components > 1) slab.push_back(f.components);
@@ -141,7 +150,8 @@ TrajectoryWriter::~TrajectoryWriter() {
     }
   }
   if (!broken_) return;
-  // The file stays as the last flush has left it. HDF5 would write what describes data that are not there when it closes: nothing is closed.
+  // The file stays as the last flush has left it. HDF5 would write what describes data that are not there when it
+  // closes: nothing is closed.
   for (auto *all : {&state_, &diagnostics_})
     for (auto &series : *all) (void)series.release();
   for (auto *series : {&time_, &step_, &critical_}) (void)series->release();
@@ -179,7 +189,8 @@ void TrajectoryWriter::writeHeader(const Scene &scene, const Elements &elements,
   file_.write("topology/rod_cell_offsets", {nr + 1}, elements.rod_cells.data());
   file_.write("topology/closed", {nr}, closed.data());
   file_.write("topology/edges", {hsize_t(edges_), 2}, ends.data());
-  // The rods in XDMF's code for mixed cells: 2 for a polyline, its number of points, the points; a ring ends where it began.
+  // The rods in XDMF's code for mixed cells: 2 for a polyline, its number of points, the points; a ring ends where it
+  // began.
   std::vector<int> polylines;
   for (const RodRange &rod : elements.rods) {
     polylines.insert(polylines.end(), {2, rod.vertices + (rod.closed ? 1 : 0)});
@@ -262,7 +273,8 @@ void TrajectoryWriter::writeMaterials() {
   write("mass_damping_coefficient", "1/s", [](const Material &m) { return m.mass_damping_coefficient; });
   write("stiffness_damping_coefficient", "s", [](const Material &m) { return m.stiffness_damping_coefficient; });
   std::vector<double> flexural;
-  for (const Rod &rod : scene_.rods) flexural.insert(flexural.end(), rod.material.flexural_stiffness.begin(), rod.material.flexural_stiffness.end());
+  for (const Rod &rod : scene_.rods)
+    flexural.insert(flexural.end(), rod.material.flexural_stiffness.begin(), rod.material.flexural_stiffness.end());
   file_.write("material/flexural_stiffness", {rods_, 2}, flexural.data(), "N m^2");
 }
 
@@ -273,8 +285,10 @@ void TrajectoryWriter::writeFrame(const State &state) {
       if (state_[k] && fields[k].source == source) return true;
     return false;
   };
-  if (wanted(From::strains)) snapshot.strains = rodStrains(scene_, elements_, state, state.time, dynamic_ ? 1 : state.time);
-  if (wanted(From::actions)) snapshot.actions = rodActions(scene_, elements_, state, state.time, dynamic_ ? 1 : state.time);
+  if (wanted(From::strains))
+    snapshot.strains = rodStrains(scene_, elements_, state, state.time, dynamic_ ? 1 : state.time);
+  if (wanted(From::actions))
+    snapshot.actions = rodActions(scene_, elements_, state, state.time, dynamic_ ? 1 : state.time);
   for (std::size_t k = 0; k < state_.size(); ++k)
     if (state_[k]) state_[k]->append(fields[k].data(snapshot));
   const double step = double(state.step);
@@ -289,7 +303,8 @@ void TrajectoryWriter::writeDiagnostics(const Diagnostics &row) {
     const double value = diagnosticsColumns()[k].value(row);
     diagnostics_[k]->append(&value);
     if (k) csv_rows_ += ',';
-    csv_rows_.append(text, std::to_chars(text, text + sizeof text, value).ptr); // as many digits as bring the number back
+    csv_rows_.append(text,
+                     std::to_chars(text, text + sizeof text, value).ptr); // as many digits as bring the number back
   }
   csv_rows_ += '\n';
 }
@@ -317,7 +332,8 @@ void TrajectoryWriter::flushWhenDue() {
   for (const auto &series : state_)
     if (series) waiting += series->waitingBytes();
   const Clock::time_point now = Clock::now();
-  const bool describe = times_.size() >= 2 * described_ && now - described_at_ > 4 * patience; // now and then: a killed run keeps a usable XDMF file
+  const bool describe = times_.size() >= 2 * described_ &&
+                        now - described_at_ > 4 * patience; // now and then: a killed run keeps a usable XDMF file
   if (describe || waiting > most_waiting || now - flushed_ > patience) flush();
   if (!describe) return;
   writeXdmf();
@@ -325,23 +341,23 @@ void TrajectoryWriter::flushWhenDue() {
   described_at_ = now;
 }
 
-/// One frame of a block, in which the mark '@' stands for its number and '#' for its time. `rods`: a polyline each, with the fields of vertices;
-/// `edges`: a segment each, with those of edges as cell data as well.
+/// One frame of a block, in which the mark '@' stands for its number and '#' for its time. `rods`: a polyline each,
+/// with the fields of vertices; `edges`: a segment each, with those of edges as cell data as well.
 std::string TrajectoryWriter::xdmfFrame(bool edges) const {
   std::ostringstream out;
   auto dataset = [&](const std::string &name, const std::string &shape, const char *type, int bytes) {
-    out << "<DataItem Dimensions=\"" << shape << "\" NumberType=\"" << type << "\" Precision=\"" << bytes << "\" Format=\"HDF\">trajectory.h5:/" << name
-        << "</DataItem>\n";
+    out << "<DataItem Dimensions=\"" << shape << "\" NumberType=\"" << type << "\" Precision=\"" << bytes
+        << "\" Format=\"HDF\">trajectory.h5:/" << name << "</DataItem>\n";
   };
-  // One frame out of a dataset (nt, n[, c]), or one of its components. ParaView takes the first text in here as the geometry's name: it keeps
-  // what it read under that name, and complains when there is none.
+  // One frame out of a dataset (nt, n[, c]), or one of its components. ParaView takes the first text in here as the
+  // geometry's name: it keeps what it read under that name, and complains when there is none.
   auto frameOf = [&](const Field &f, int component = -1) {
     const std::string n = std::to_string(f.place == On::vertices ? vertices_ : edges_);
     std::string shape = n;
     if (f.components > 1) shape.append(" ").append(std::to_string(f.components));
     const std::string part = component < 0 ? shape : n + " 1";
-    out << "     <DataItem ItemType=\"HyperSlab\" Dimensions=\"" << (component < 0 ? shape : n) << "\"><!-- frame @ --><DataItem Dimensions=\"3 "
-        << (f.components > 1 ? 3 : 2) << "\" Format=\"XML\">@ 0 ";
+    out << "     <DataItem ItemType=\"HyperSlab\" Dimensions=\"" << (component < 0 ? shape : n)
+        << "\"><!-- frame @ --><DataItem Dimensions=\"3 " << (f.components > 1 ? 3 : 2) << "\" Format=\"XML\">@ 0 ";
     if (f.components > 1) out << std::max(component, 0) << " 1 ";
     out << "1 1 1 " << part << "</DataItem>";
     dataset(std::string("state/") + f.name, std::to_string(times_.size()) + " " + shape, "Float", 8);
@@ -350,7 +366,8 @@ std::string TrajectoryWriter::xdmfFrame(bool edges) const {
   auto attribute = [&](const Field &f, int component = -1) {
     out << "    <Attribute Name=\"" << f.name;
     if (component >= 0) out << "_" << component + 1;
-    out << "\" AttributeType=\"" << (f.components == 3 ? "Vector" : "Scalar") << "\" Center=\"" << (f.place == On::vertices ? "Node" : "Cell") << "\">\n";
+    out << "\" AttributeType=\"" << (f.components == 3 ? "Vector" : "Scalar") << "\" Center=\""
+        << (f.place == On::vertices ? "Node" : "Cell") << "\">\n";
     frameOf(f, component);
     out << "    </Attribute>\n";
   };
@@ -384,9 +401,11 @@ std::string TrajectoryWriter::xdmfFrame(bool edges) const {
 void TrajectoryWriter::writeXdmf() const {
   const std::string path = folder_ + "/trajectory.xdmf";
   std::ofstream out(path + ".part");
-  out << "<?xml version=\"1.0\"?>\n<!-- In ParaView choose \"XDMF Reader\"; its Xdmf3 readers do not know HyperSlab. -->\n<Xdmf Version=\"3.0\">\n <Domain>\n";
+  out << "<?xml version=\"1.0\"?>\n<!-- In ParaView choose \"XDMF Reader\"; its Xdmf3 readers do not know HyperSlab. "
+         "-->\n<Xdmf Version=\"3.0\">\n <Domain>\n";
   for (const bool edges : {false, true}) {
-    out << "  <Grid Name=\"" << (edges ? "edges" : "rods") << "\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
+    out << "  <Grid Name=\"" << (edges ? "edges" : "rods")
+        << "\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
     const std::string pattern = xdmfFrame(edges);
     std::string text;
     for (std::size_t frame = 0; frame < times_.size(); ++frame) {

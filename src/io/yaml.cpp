@@ -19,15 +19,23 @@ public:
   }
   void OnDocumentEnd() override {}
   void OnNull(const YAML::Mark &mark, YAML::anchor_t anchor) override { value(mark, anchor); }
-  void OnScalar(const YAML::Mark &mark, const std::string &, YAML::anchor_t anchor, const std::string &) override { value(mark, anchor); }
+  void OnScalar(const YAML::Mark &mark, const std::string &, YAML::anchor_t anchor, const std::string &) override {
+    value(mark, anchor);
+  }
   void OnAlias(const YAML::Mark &mark, YAML::anchor_t anchor) override {
     for (const Block &block : open_)
       if (block.anchor == anchor) throw YAML::ParserException(mark, "an alias of what it stands in");
     count(mark, sizes_[anchor]);
   }
-  void OnSequenceStart(const YAML::Mark &mark, const std::string &, YAML::anchor_t anchor, YAML::EmitterStyle::value) override { begin(mark, anchor); }
+  void OnSequenceStart(const YAML::Mark &mark, const std::string &, YAML::anchor_t anchor,
+                       YAML::EmitterStyle::value) override {
+    begin(mark, anchor);
+  }
   void OnSequenceEnd() override { end(); }
-  void OnMapStart(const YAML::Mark &mark, const std::string &, YAML::anchor_t anchor, YAML::EmitterStyle::value) override { begin(mark, anchor); }
+  void OnMapStart(const YAML::Mark &mark, const std::string &, YAML::anchor_t anchor,
+                  YAML::EmitterStyle::value) override {
+    begin(mark, anchor);
+  }
   void OnMapEnd() override { end(); }
 
 private:
@@ -44,7 +52,8 @@ private:
     constexpr double most = 5e6;
     values_ += values;
     end_ = std::max(end_, mark.pos);
-    if (values_ > most) throw YAML::ParserException(mark, "more than 5 million values; write points into a polyline file");
+    if (values_ > most)
+      throw YAML::ParserException(mark, "more than 5 million values; write points into a polyline file");
   }
   void value(const YAML::Mark &mark, YAML::anchor_t anchor) {
     count(mark, 1);
@@ -123,9 +132,11 @@ void YamlValue::fail(const std::string &message) const { throw SceneError(place(
 
 double YamlValue::number() const {
   double value;
-  if (!node_.IsScalar() || !YAML::convert<double>::decode(node_, value)) fail("'" + name_ + "' must be a number, found " + describe(node_));
+  if (!node_.IsScalar() || !YAML::convert<double>::decode(node_, value))
+    fail("'" + name_ + "' must be a number, found " + describe(node_));
   if (!std::isfinite(value)) fail("'" + name_ + "' must be finite, found " + describe(node_));
-  if (!isOfAnySize(value)) fail("'" + name_ + "' must be 0 or of a size between 1e-100 and 1e100, found " + describe(node_));
+  if (!isOfAnySize(value))
+    fail("'" + name_ + "' must be 0 or of a size between 1e-100 and 1e100, found " + describe(node_));
   return value;
 }
 
@@ -133,21 +144,25 @@ int YamlValue::integer() const {
   double number; // not as an int, which would take a leading 0 for a sign of octal numbers
   if (!node_.IsScalar() || !YAML::convert<double>::decode(node_, number) || number != std::floor(number))
     fail("'" + name_ + "' must be a whole number, found " + describe(node_));
-  if (!(std::abs(number) <= std::numeric_limits<int>::max())) fail("'" + name_ + "' is too large, found " + describe(node_));
+  if (!(std::abs(number) <= std::numeric_limits<int>::max()))
+    fail("'" + name_ + "' is too large, found " + describe(node_));
   return int(number);
 }
 
 double YamlValue::number(const Key &key) const {
   const double value = number();
-  if (const std::string wrong = outOfBounds(key, value); !wrong.empty()) fail("'" + name_ + "' " + wrong + ", found " + describe(node_));
+  if (const std::string wrong = outOfBounds(key, value); !wrong.empty())
+    fail("'" + name_ + "' " + wrong + ", found " + describe(node_));
   return value;
 }
 
 int YamlValue::integer(const Key &key) const {
   const int value = integer();
   constexpr int most = 10'000'000; // of anything that is counted
-  if (const std::string wrong = outOfBounds(key, value); !wrong.empty()) fail("'" + name_ + "' " + wrong + ", found " + describe(node_));
-  if (value > most) fail("'" + name_ + "' is too large: at most " + std::to_string(most) + ", found " + describe(node_));
+  if (const std::string wrong = outOfBounds(key, value); !wrong.empty())
+    fail("'" + name_ + "' " + wrong + ", found " + describe(node_));
+  if (value > most)
+    fail("'" + name_ + "' is too large: at most " + std::to_string(most) + ", found " + describe(node_));
   return value;
 }
 
@@ -158,7 +173,8 @@ std::array<double, 2> YamlValue::pair(const Key &key) const {
   }
   const std::vector<double> list = numbers(2);
   for (const double value : list)
-    if (const std::string wrong = outOfBounds(key, value); !wrong.empty()) fail("'" + name_ + "' " + wrong + ", found " + std::to_string(value));
+    if (const std::string wrong = outOfBounds(key, value); !wrong.empty())
+      fail("'" + name_ + "' " + wrong + ", found " + std::to_string(value));
   return {list[0], list[1]};
 }
 
@@ -167,12 +183,14 @@ std::string YamlValue::word(const Key &key) const {
   const std::vector<std::string> choices = choicesOf(key);
   if (std::find(choices.begin(), choices.end(), value) != choices.end()) return value;
   const std::string near = closest(value, choices);
-  fail("'" + name_ + "' must be one of " + join(choices) + "; found '" + value + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?"));
+  fail("'" + name_ + "' must be one of " + join(choices) + "; found '" + value + "'" +
+       (near.empty() ? "" : "; did you mean '" + near + "'?"));
 }
 
 bool YamlValue::boolean() const {
   bool value;
-  if (!node_.IsScalar() || !YAML::convert<bool>::decode(node_, value)) fail("'" + name_ + "' must be true or false, found " + describe(node_));
+  if (!node_.IsScalar() || !YAML::convert<bool>::decode(node_, value))
+    fail("'" + name_ + "' must be true or false, found " + describe(node_));
   return value;
 }
 
@@ -182,7 +200,8 @@ std::string YamlValue::text() const {
 }
 
 std::vector<double> YamlValue::numbers(std::size_t count) const {
-  if (!node_.IsSequence() || node_.size() != count) fail("'" + name_ + "' must be a list of " + std::to_string(count) + " numbers, found " + describe(node_));
+  if (!node_.IsSequence() || node_.size() != count)
+    fail("'" + name_ + "' must be a list of " + std::to_string(count) + " numbers, found " + describe(node_));
   std::vector<double> values;
   for (const YAML::Node &n : node_) values.push_back(YamlValue(n, file_, name_).number());
   return values;
@@ -196,7 +215,8 @@ Vec3 YamlValue::vector() const {
 std::vector<YamlValue> YamlValue::items() const {
   if (!node_.IsSequence()) fail("'" + name_ + "' must be a list, found " + describe(node_));
   std::vector<YamlValue> list;
-  for (std::size_t i = 0; i < node_.size(); ++i) list.emplace_back(node_[i], file_, name_ + "[" + std::to_string(i) + "]");
+  for (std::size_t i = 0; i < node_.size(); ++i)
+    list.emplace_back(node_[i], file_, name_ + "[" + std::to_string(i) + "]");
   return list;
 }
 
@@ -208,13 +228,16 @@ YamlMap::YamlMap(const YamlValue &value, KeyOf<KeyType::map, KeyType::list, KeyT
 }
 
 void YamlMap::refuseRepeated() const {
-  if (!value_.isMap()) value_.fail("'" + value_.name() + "' must be a map of keys and values, found " + describe(value_.node()));
+  if (!value_.isMap())
+    value_.fail("'" + value_.name() + "' must be a map of keys and values, found " + describe(value_.node()));
   std::map<std::string, int> line;
   for (const auto &entry : value_.node()) {
     const YamlValue key(entry.first, value_.file(), value_.name());
     if (!key.isScalar()) key.fail("a key in '" + value_.name() + "' must be a word, found " + describe(entry.first));
     const auto [first, fresh] = line.emplace(key.text(), entry.first.Mark().line + 1);
-    if (!fresh) key.fail("the key '" + key.text() + "' stands here a second time (first in line " + std::to_string(first->second) + "); keep one of the two");
+    if (!fresh)
+      key.fail("the key '" + key.text() + "' stands here a second time (first in line " +
+               std::to_string(first->second) + "); keep one of the two");
   }
 }
 
@@ -234,7 +257,8 @@ YamlValue YamlMap::at(const Key &key) {
   for (const auto &entry : value_.node())
     if (!asked_.count(entry.first.Scalar())) others.push_back(entry.first.Scalar());
   const std::string near = closest(name, others);
-  const std::string choices = join(choicesOf(key)), what = key.type == KeyType::word_or_map ? "a map, or " + choices : choices;
+  const std::string choices = join(choicesOf(key)),
+                    what = key.type == KeyType::word_or_map ? "a map, or " + choices : choices;
   value_.fail("'" + value_.name() + "' needs the key '" + name + "'" + (what.empty() ? "" : " (" + what + ")") +
               (near.empty() ? "" : ", found '" + near + "'"));
 }
@@ -250,7 +274,8 @@ void YamlMap::finish() const {
     if (std::find(allowed.begin(), allowed.end(), name) != allowed.end())
       key.fail("the key '" + name + "' has no meaning in this '" + value_.name() + "'; take it away");
     const std::string near = closest(name, allowed);
-    key.fail("unknown key '" + name + "' in '" + value_.name() + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") + " Allowed: " + join(allowed));
+    key.fail("unknown key '" + name + "' in '" + value_.name() + "'" +
+             (near.empty() ? "" : "; did you mean '" + near + "'?") + " Allowed: " + join(allowed));
   }
 }
 
@@ -266,7 +291,8 @@ std::string outOfBounds(const Key &key, double value) {
   const bool fits = (b.above ? value > b.least : value >= b.least) && (b.below ? value < b.most : value <= b.most);
   if (fits) return {};
   if (std::isfinite(b.least) && std::isfinite(b.most))
-    return std::string("must lie in ") + (b.above ? "(" : "[") + text(b.least) + ", " + text(b.most) + (b.below ? ")" : "]");
+    return std::string("must lie in ") + (b.above ? "(" : "[") + text(b.least) + ", " + text(b.most) +
+           (b.below ? ")" : "]");
   if (std::isfinite(b.most)) return (b.below ? "must be below " : "must be at most ") + text(b.most);
   if (b.least == 0) return b.above ? "must be greater than zero" : "must not be negative";
   return (b.above ? "must be greater than " : "must be at least ") + text(b.least);

@@ -80,9 +80,11 @@ PetscErrorCode DofMap::setUp(const Scene &scene) {
   vertices_ = edges_ = 0;
   slots_ = lanes; // room for the frame before the first rod
   for (const Rod &rod : scene.rods) {
-    // Two slots behind the last vertex, one before the next rod, and a pack between, so that no pack holds parts of two rods.
+    // Two slots behind the last vertex, one before the next rod, and a pack between, so that no pack holds parts of two
+    // rods.
     const int slots = Planes::planeStride(rod.vertices() + 3 + lanes);
-    rods_.push_back({vertices_, rod.vertices(), edges_, rod.edges(), slots_, slots, !rod.material.isCable(), rod.closed});
+    rods_.push_back(
+        {vertices_, rod.vertices(), edges_, rod.edges(), slots_, slots, !rod.material.isCable(), rod.closed});
     vertices_ += rod.vertices();
     edges_ += rod.edges();
     slots_ += slots;
@@ -118,7 +120,8 @@ PetscErrorCode DofMap::setUp(const Scene &scene) {
       }
       ++point;
     }
-    for (PetscInt *u = &unknown_[std::size_t(slot_size) * rod.first_slot]; u < &unknown_[std::size_t(slot_size) * rod.vertexEnd()]; ++u)
+    for (PetscInt *u = &unknown_[std::size_t(slot_size) * rod.first_slot];
+         u < &unknown_[std::size_t(slot_size) * rod.vertexEnd()]; ++u)
       if (*u >= 0) PetscCheck(*u == next++, PETSC_COMM_SELF, PETSC_ERR_PLIB, "unknowns must follow the slots");
   }
   unknown_begin_.push_back(next);
@@ -188,7 +191,8 @@ PetscErrorCode DofMap::createMatrix(Mat *matrix) {
 
 PetscErrorCode DofMap::fillMatrix(const EdgeBlocks &blocks, Mat matrix) {
   PetscFunctionBeginUser;
-  for (std::size_t n = 0; n < source_.size(); ++n) entries_[n] = source_[n] >= 0 ? blocks.data()[source_[n]] : -blocks.data()[~source_[n]];
+  for (std::size_t n = 0; n < source_.size(); ++n)
+    entries_[n] = source_[n] >= 0 ? blocks.data()[source_[n]] : -blocks.data()[~source_[n]];
   PetscCall(MatSetValuesCOO(matrix, entries_.data(), INSERT_VALUES));
   PetscFunctionReturn(0);
 }

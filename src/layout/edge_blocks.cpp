@@ -2,7 +2,9 @@
 
 namespace tendril {
 
-void EdgeBlocks::clear(const RodRange &rod) { std::fill_n(entry(rod, 0) - 1, std::size_t(slot_entries) * rod.slots, 0.0); }
+void EdgeBlocks::clear(const RodRange &rod) {
+  std::fill_n(entry(rod, 0) - 1, std::size_t(slot_entries) * rod.slots, 0.0);
+}
 
 void EdgeBlocks::subtractFrom(const EdgeBlocks &other) {
   for (std::size_t k = 0; k < data_.size(); ++k) data_[k] = other.data_[k] - data_[k];
@@ -36,7 +38,8 @@ void EdgeBlocks::multiply(const RodRange &rod, const Planes &x, Planes &y) const
   auto value = [&](int plane, int i) { return entry(rod, plane)[i]; };
   for (int i = 0; i < rod.vertices; ++i)
     for (int r = 0; r < 3; ++r)
-      for (int c = 0; c < 3; ++c) y[r][rod.slot(i)] += value(vertex(std::min(r, c), std::max(r, c)), i) * x[c][rod.slot(i)];
+      for (int c = 0; c < 3; ++c)
+        y[r][rod.slot(i)] += value(vertex(std::min(r, c), std::max(r, c)), i) * x[c][rod.slot(i)];
   Four before{};
   for (int i = 0; i < rod.edges + (rod.closed ? 1 : 0); ++i) {
     const Four here = edge(i == rod.vertices ? 0 : i);
@@ -58,7 +61,8 @@ double EdgeBlocks::magnitude(const RodRange &rod, const Planes &x) const {
   std::array<double, edge_size> before{};
   for (int i = 0; i < rod.vertices; ++i)
     for (int r = 0; r < 3; ++r)
-      for (int c = r; c < 3; ++c) sum += std::pow((r == c ? 1 : 2) * entry(rod, vertex(r, c))[i] * x[r][rod.slot(i)] * x[c][rod.slot(i)], 2);
+      for (int c = r; c < 3; ++c)
+        sum += std::pow((r == c ? 1 : 2) * entry(rod, vertex(r, c))[i] * x[r][rod.slot(i)] * x[c][rod.slot(i)], 2);
   for (int i = 0; i < rod.edges; ++i) {
     std::array<double, edge_size> here{0, 0, 0, x[3][rod.slot(i)]};
     for (int a = 0; a < 3; ++a) here[a] = x[a][rod.slot(i + 1)] - x[a][rod.slot(i)];

@@ -3,11 +3,13 @@
 namespace tendril {
 namespace {
 
-/// Strains (integrated) that belong to a curvature and twist [1/m] over a cell of length `length`, in the rod's measure.
+/// Strains (integrated) that belong to a curvature and twist [1/m] over a cell of length `length`, in the rod's
+/// measure.
 std::array<double, 3> integratedStrain(const Vec3 &strain, double length, Measure measure) {
   const double bend = std::hypot(strain[0], strain[1]) * length, twist = strain[2] * length;
   const double factor = measure == Measure::tan && bend > 0 ? 2 * std::tan(bend / 2) / bend : 1;
-  return {strain[0] * length * factor, strain[1] * length * factor, measure == Measure::tan ? 2 * std::tan(twist / 2) : twist};
+  return {strain[0] * length * factor, strain[1] * length * factor,
+          measure == Measure::tan ? 2 * std::tan(twist / 2) : twist};
 }
 
 } // namespace
@@ -16,7 +18,8 @@ std::array<double, 3> integratedStrain(const Vec3 &strain, double length, Measur
 class CellBuilder {
 public:
   CellBuilder(const Scene &scene, int rod, Elements &out)
-      : rod_(scene.rods[rod]), range_(out.rods[rod]), loose_(out.loose[rod]), out_(out), holder_(rod_.vertices(), nullptr) {
+      : rod_(scene.rods[rod]), range_(out.rods[rod]), loose_(out.loose[rod]), out_(out),
+        holder_(rod_.vertices(), nullptr) {
     for (std::size_t s = 0; s < scene.supports.size(); ++s) {
       const Support &support = scene.supports[s];
       if (support.rod != rod || !support.holdsTwist()) continue;
@@ -87,12 +90,14 @@ private:
   /// The half cell between an edge and the frame that holds its end: Lbar = L/2, lbar = l/2.
   void addHalfCell(int v, int edge, const Support &holder, bool edge_first) {
     const Frame &held = holder.frame, f = referenceFrame(rod_, edge);
-    const std::array<double, 2> flexural = holder.kind == Support::Kind::clamp ? rod_.material.flexural_stiffness : std::array<double, 2>{0, 0};
+    const std::array<double, 2> flexural =
+        holder.kind == Support::Kind::clamp ? rod_.material.flexural_stiffness : std::array<double, 2>{0, 0};
     int slot = range_.slot(v);
     if (!isEnd(v)) {
       slot = out_.slots++;
       const int frame = out_.support_slot[&holder - supports_], middle = place(v);
-      loose_.push_back(edge_first ? LooseCell{slot, middle - 1, frame, middle} : LooseCell{slot, frame, middle, middle});
+      loose_.push_back(edge_first ? LooseCell{slot, middle - 1, frame, middle}
+                                  : LooseCell{slot, frame, middle, middle});
     }
     if (edge_first)
       add(slot, f, held, 0.5 * f.length, {0.5, 0}, {1, 0}, flexural, rod_.material.torsional_stiffness);
@@ -100,8 +105,8 @@ private:
       add(slot, held, f, 0.5 * f.length, {0, 0.5}, {0, 1}, flexural, rod_.material.torsional_stiffness);
   }
 
-  void add(int slot, const Frame &f0, const Frame &f1, double length, std::array<double, 2> weight, std::array<double, 2> free, std::array<double, 2> flexural,
-           double torsional) {
+  void add(int slot, const Frame &f0, const Frame &f1, double length, std::array<double, 2> weight,
+           std::array<double, 2> free, std::array<double, 2> flexural, double torsional) {
     CellOf<double> cell{};
     if (rod_.energy == Energy::seed)
       cell.weight = {weight[0] / length, weight[1] / length};
@@ -113,7 +118,8 @@ private:
     if (rod_.natural == Rod::Natural::given)
       rest = integratedStrain(rod_.natural_strain, length, rod_.measure);
     else
-      rest = rod_.measure == Measure::tan ? cellStrain<Measure::tan>(f0, f1, cell) : cellStrain<Measure::angle>(f0, f1, cell);
+      rest = rod_.measure == Measure::tan ? cellStrain<Measure::tan>(f0, f1, cell)
+                                          : cellStrain<Measure::angle>(f0, f1, cell);
     out_.cell_slot.push_back(slot);
     out_.constants_[6][slot] = length;
     for (int k = 0; k < 3; ++k) {
@@ -129,7 +135,8 @@ private:
 };
 
 Elements::Elements(const Scene &scene, const DofMap &dofs)
-    : rods(dofs.rods()), slots(dofs.slots()), loose(rods.size()), end_couples(rods.size()), support_slot(scene.supports.size(), -1), rod_cells{0} {
+    : rods(dofs.rods()), slots(dofs.slots()), loose(rods.size()), end_couples(rods.size()),
+      support_slot(scene.supports.size(), -1), rod_cells{0} {
   const int most = slots + 3 * int(scene.supports.size()); // a frame and two cells for each support along a rod
   constants_ = Planes(7, most);
   cells_ = Planes(cell_planes, most);

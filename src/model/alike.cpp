@@ -8,17 +8,21 @@ namespace {
 constexpr double rounding = 1e-9; ///< that of a shift, over lengths
 
 bool same(const Support &a, const Support &b) {
-  return a.kind == b.kind && a.vertex == b.vertex && a.motion == b.motion && a.tangent_given == b.tangent_given && a.director_given == b.director_given &&
-         (a.kind == Support::Kind::pin || ((a.frame.tangent - b.frame.tangent).norm() < rounding && (a.frame.director - b.frame.director).norm() < rounding));
+  return a.kind == b.kind && a.vertex == b.vertex && a.motion == b.motion && a.tangent_given == b.tangent_given &&
+         a.director_given == b.director_given &&
+         (a.kind == Support::Kind::pin || ((a.frame.tangent - b.frame.tangent).norm() < rounding &&
+                                           (a.frame.director - b.frame.director).norm() < rounding));
 }
 
 bool same(const NodalForce &a, const NodalForce &b) { return a.vertex == b.vertex && a.force == b.force; }
 
-bool same(const EdgeMoment &a, const EdgeMoment &b) { return a.edge == b.edge && a.torque == b.torque && a.moment == b.moment; }
+bool same(const EdgeMoment &a, const EdgeMoment &b) {
+  return a.edge == b.edge && a.torque == b.torque && a.moment == b.moment;
+}
 
 bool sameShape(const Rod &a, const Drawing &drawing_a, const Rod &b, const Drawing &drawing_b) {
-  if (a.position.size() != b.position.size() || a.closed != b.closed || bool(drawing_a.curve) != bool(drawing_b.curve) ||
-      drawing_a.directors_given != drawing_b.directors_given)
+  if (a.position.size() != b.position.size() || a.closed != b.closed ||
+      bool(drawing_a.curve) != bool(drawing_b.curve) || drawing_a.directors_given != drawing_b.directors_given)
     return false;
   const Vec3 shift = b.position[0] - a.position[0];
   const double close = rounding * a.edge(0).norm();
@@ -57,14 +61,16 @@ std::vector<int> firstAlike(const Scene &scene, const std::vector<Drawing> &draw
   const auto moments = byRod(scene.moments, rods);
   auto alike = [&](int r, int s) {
     const Rod &a = scene.rods[r], &b = scene.rods[s];
-    return a.material == b.material && a.measure == b.measure && a.energy == b.energy && a.gravity == b.gravity && a.natural == b.natural &&
-           a.natural_strain == b.natural_strain && a.initial_velocity == b.initial_velocity && a.initial_turns == b.initial_turns &&
-           sameShape(a, drawings[r], b, drawings[s]) && sameList(supports[r], supports[s]) && sameList(forces[r], forces[s]) &&
-           sameList(moments[r], moments[s]);
+    return a.material == b.material && a.measure == b.measure && a.energy == b.energy && a.gravity == b.gravity &&
+           a.natural == b.natural && a.natural_strain == b.natural_strain && a.initial_velocity == b.initial_velocity &&
+           a.initial_turns == b.initial_turns && sameShape(a, drawings[r], b, drawings[s]) &&
+           sameList(supports[r], supports[s]) && sameList(forces[r], forces[s]) && sameList(moments[r], moments[s]);
   };
   std::vector<int> first, kinds;
   for (int s = 0; s < int(rods); ++s) {
-    const auto found = scene.rotation.angular_velocity.isZero(0) ? std::find_if(kinds.begin(), kinds.end(), [&](int r) { return alike(r, s); }) : kinds.end();
+    const auto found = scene.rotation.angular_velocity.isZero(0)
+                           ? std::find_if(kinds.begin(), kinds.end(), [&](int r) { return alike(r, s); })
+                           : kinds.end();
     first.push_back(found == kinds.end() ? s : *found);
     if (found == kinds.end()) kinds.push_back(s);
   }

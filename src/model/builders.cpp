@@ -22,7 +22,9 @@ Polyline lineShape(const Vec3 &from, const Vec3 &to, int edges) {
 
 Polyline ringShape(const Vec3 &center, const Vec3 &normal, double radius, int edges) {
   const Vec3 a = anyNormal(normal), b = normal.cross(a);
-  return alongCurve([=](double s) { return Vec3(center + radius * (std::cos(2 * pi * s) * a + std::sin(2 * pi * s) * b)); }, edges, true);
+  return alongCurve(
+      [=](double s) { return Vec3(center + radius * (std::cos(2 * pi * s) * a + std::sin(2 * pi * s) * b)); }, edges,
+      true);
 }
 
 Polyline helixShape(const HelixShape &h) {

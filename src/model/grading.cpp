@@ -5,13 +5,16 @@
 namespace tendril {
 namespace {
 
-constexpr double corner = 30 * pi / 180; ///< turning of a corner [rad]; where a smooth rod turns so much, its strains are 10 % off
-constexpr double power = 1.0 / 3;        ///< of the squared curvature
-constexpr double least_curvature = 10;   ///< over the length; with less, hooks whose straight part bends under its load need more edges than uniform ones
-constexpr double most_growth = 1.5;      ///< of edges from one to the next; with 1.2, hooks need up to 9 % more edges
-constexpr double most_step = 1.2;        ///< of edges across a place that stays
-constexpr int least_samples = 1024;      ///< along a rod
-constexpr int first_edges = 8;           ///< of a rod, or as many as turn by `corner` a vertex: those at which the growth is bounded
+constexpr double corner =
+    30 * pi / 180; ///< turning of a corner [rad]; where a smooth rod turns so much, its strains are 10 % off
+constexpr double power = 1.0 / 3;      ///< of the squared curvature
+constexpr double least_curvature = 10; ///< over the length; with less, hooks whose straight part bends under its load
+                                       ///< need more edges than uniform ones
+constexpr double most_growth = 1.5;    ///< of edges from one to the next; with 1.2, hooks need up to 9 % more edges
+constexpr double most_step = 1.2;      ///< of edges across a place that stays
+constexpr int least_samples = 1024;    ///< along a rod
+constexpr int first_edges =
+    8; ///< of a rod, or as many as turn by `corner` a vertex: those at which the growth is bounded
 
 double interpolate(const std::vector<double> &x, const std::vector<double> &y, double at) {
   const auto above = std::upper_bound(x.begin(), x.end(), at);
@@ -47,7 +50,12 @@ std::vector<double> curvatures(const Rod &rod, double &turning) {
   std::vector<double> filled = out;
   for (int v = 0; v < n; ++v)
     if (out[v] < 0) {
-      const double before = v > 0 ? out[v - 1] : rod.closed ? out[n - 1] : -1, after = v + 1 < n ? out[v + 1] : rod.closed ? out[0] : -1;
+      const double before = v > 0        ? out[v - 1]
+                            : rod.closed ? out[n - 1]
+                                         : -1,
+                   after = v + 1 < n    ? out[v + 1]
+                           : rod.closed ? out[0]
+                                        : -1;
       filled[v] = std::max({0.0, before, after});
     }
   return filled;
@@ -89,7 +97,8 @@ Samples sample(const Rod &rod, const Curve &curve) {
 
 std::vector<double> integral(const std::vector<double> &density, const std::vector<double> &length) {
   std::vector<double> out{0};
-  for (std::size_t j = 1; j < length.size(); ++j) out.push_back(out.back() + 0.5 * (density[j] + density[j - 1]) * (length[j] - length[j - 1]));
+  for (std::size_t j = 1; j < length.size(); ++j)
+    out.push_back(out.back() + 0.5 * (density[j] + density[j - 1]) * (length[j] - length[j - 1]));
   return out;
 }
 
@@ -103,18 +112,20 @@ void boundGrowth(std::vector<double> &density, const std::vector<double> &length
       if (closed) h.front() = h.back() = std::min(h.front(), h.back());
       for (std::size_t j = 1; j < h.size(); ++j) h[j] = std::min(h[j], h[j - 1] + slope * (length[j] - length[j - 1]));
       if (closed) h.front() = h.back();
-      for (std::size_t j = h.size() - 1; j > 0; --j) h[j - 1] = std::min(h[j - 1], h[j] + slope * (length[j] - length[j - 1]));
+      for (std::size_t j = h.size() - 1; j > 0; --j)
+        h[j - 1] = std::min(h[j - 1], h[j] + slope * (length[j] - length[j - 1]));
     }
     std::transform(h.begin(), h.end(), density.begin(), [](double x) { return 1 / x; });
   }
 }
 
-/// Whole numbers of edges up to each end of segments, when there are `multiple` in all. `worst` is the largest ratio by which that changes edge lengths
-/// from a segment to the next.
+/// Whole numbers of edges up to each end of segments, when there are `multiple` in all. `worst` is the largest ratio by
+/// which that changes edge lengths from a segment to the next.
 std::vector<int> wholeEdges(const std::vector<double> &ends, int multiple, bool closed, double &worst) {
   std::vector<int> out{0};
   const int segments = int(ends.size()) - 1;
-  for (int k = 1; k <= segments; ++k) out.push_back(std::clamp(int(std::lround(ends[k] * multiple)), out.back() + 1, multiple - (segments - k)));
+  for (int k = 1; k <= segments; ++k)
+    out.push_back(std::clamp(int(std::lround(ends[k] * multiple)), out.back() + 1, multiple - (segments - k)));
   worst = 1;
   auto change = [&](int k) { return (ends[k + 1] - ends[k]) * multiple / (out[k + 1] - out[k]); };
   for (int k = closed ? 0 : 1; k < segments; ++k) {
@@ -124,8 +135,8 @@ std::vector<int> wholeEdges(const std::vector<double> &ends, int multiple, bool 
   return out;
 }
 
-/// The fewest edges that put the ends of segments on vertices without large steps of the edge length. Where those take more than `cheap`, larger steps
-/// do; beyond `most`, the smallest there are.
+/// The fewest edges that put the ends of segments on vertices without large steps of the edge length. Where those take
+/// more than `cheap`, larger steps do; beyond `most`, the smallest there are.
 std::vector<int> fewestEdges(const std::vector<double> &ends, int cheap, int most, bool closed) {
   constexpr double large_step = 2;
   constexpr int most_tries = 500;
@@ -174,7 +185,8 @@ Grading gradingByCurvature(const Rod &rod, const Curve &curve, const std::vector
   std::vector<double> count = integral(density, out.length);
   const double all = count.back();
   for (double &c : count) c /= all;
-  for (std::size_t j = 1; j < count.size(); ++j) out.uniform = out.uniform && std::abs((count[j] - count[j - 1]) * double(count.size() - 1) - 1) < 0.01;
+  for (std::size_t j = 1; j < count.size(); ++j)
+    out.uniform = out.uniform && std::abs((count[j] - count[j - 1]) * double(count.size() - 1) - 1) < 0.01;
 
   const int n = rod.edges();
   std::vector<int> vertices{0, n};

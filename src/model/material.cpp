@@ -11,7 +11,8 @@ double rectangleTorsion(double width, double height) {
   using std::numbers::pi;
   const double a = std::max(width, height), b = std::min(width, height);
   double sum = 0;
-  for (int n = 1; n < 60; n += 2) sum += std::tanh(n * pi * a / (2 * b)) / std::pow(n, 5); // the rest is below 1e-9 of the sum
+  for (int n = 1; n < 60; n += 2)
+    sum += std::tanh(n * pi * a / (2 * b)) / std::pow(n, 5); // the rest is below 1e-9 of the sum
   return a * b * b * b / 3 * (1 - 192 * b / (std::pow(pi, 5) * a) * sum);
 }
 

@@ -20,7 +20,8 @@ std::vector<double> lagrangeWeights(const std::vector<double> &nodes, double x) 
 
 int wrapped(int i, int n) { return ((i % n) + n) % n; }
 
-/// A director of the scene, or between two of them, on an edge of the redrawn rod. `place` counts the scene's edges from the middle of the first.
+/// A director of the scene, or between two of them, on an edge of the redrawn rod. `place` counts the scene's edges
+/// from the middle of the first.
 Vec3 directorBetween(const Rod &written, double place, const Vec3 &tangent) {
   const int n = written.edges();
   int k = int(std::floor(place));
@@ -37,28 +38,37 @@ Vec3 directorBetween(const Rod &written, double place, const Vec3 &tangent) {
 }
 
 /// Vertices stay as they are written where nothing asks for others.
-bool isRedrawn(const Rod &written, const Drawing &drawing, int edges) { return drawing.grading || edges != written.edges(); }
+bool isRedrawn(const Rod &written, const Drawing &drawing, int edges) {
+  return drawing.grading || edges != written.edges();
+}
 
 Rod redrawn(const Rod &written, const Drawing &drawing, int edges) {
   if (edges < drawing.least_edges)
-    throw SceneError("rod '" + written.name + "': its turns need at least " + shortText(drawing.least_edges) + " edges, found " + std::to_string(edges));
+    throw SceneError("rod '" + written.name + "': its turns need at least " + shortText(drawing.least_edges) +
+                     " edges, found " + std::to_string(edges));
   Rod rod = written;
   const Grading *grading = drawing.grading.get();
   const Curve curve = drawing.curve ? drawing.curve : grading ? splineThrough(written) : curveThrough(written);
   if (!drawing.curve && !grading)
     for (std::int64_t v = 0; v < written.vertices(); ++v)
       if (v * edges % written.edges() != 0 && isCorner(written, int(v)))
-        throw SceneError("rod '" + written.name + "': the corner at its vertex " + std::to_string(v) + " of " + std::to_string(written.edges()) +
-                         " edges is no vertex of " + std::to_string(edges));
+        throw SceneError("rod '" + written.name + "': the corner at its vertex " + std::to_string(v) + " of " +
+                         std::to_string(written.edges()) + " edges is no vertex of " + std::to_string(edges));
   rod.position.clear();
-  for (int i = 0; i < edges + (rod.closed ? 0 : 1); ++i) rod.position.push_back(curve(grading ? grading->parameterAt(double(i) / edges) : double(i) / edges));
+  for (int i = 0; i < edges + (rod.closed ? 0 : 1); ++i)
+    rod.position.push_back(curve(grading ? grading->parameterAt(double(i) / edges) : double(i) / edges));
   checkRod(rod);
   if (drawing.directors_given) {
-    auto middle = [&](int i) { return grading ? grading->parameterOf(grading->middle(i, edges)) * written.edges() : (i + 0.5) * written.edges() / edges; };
+    auto middle = [&](int i) {
+      return grading ? grading->parameterOf(grading->middle(i, edges)) * written.edges()
+                     : (i + 0.5) * written.edges() / edges;
+    };
     rod.director.resize(edges);
-    for (int i = 0; i < edges; ++i) rod.director[i] = directorBetween(written, middle(i) - 0.5, rod.edge(i).normalized());
+    for (int i = 0; i < edges; ++i)
+      rod.director[i] = directorBetween(written, middle(i) - 0.5, rod.edge(i).normalized());
   } else
-    setBishopDirectors(rod, transport<double>(written.director[0], written.edge(0).normalized(), rod.edge(0).normalized()));
+    setBishopDirectors(rod,
+                       transport<double>(written.director[0], written.edge(0).normalized(), rod.edge(0).normalized()));
   return rod;
 }
 
@@ -68,40 +78,49 @@ int movedVertex(const Rod &written, const Drawing &drawing, int vertex, int edge
     const auto &stays = drawing.grading->stays;
     const auto found = std::lower_bound(stays.begin(), stays.end(), std::pair(vertex, 0));
     if (found == stays.end() || found->first != vertex)
-      throw SceneError("rod '" + written.name + "': its vertex " + std::to_string(vertex) + " is not among those that its grading keeps");
+      throw SceneError("rod '" + written.name + "': its vertex " + std::to_string(vertex) +
+                       " is not among those that its grading keeps");
     place = found->second;
     whole = drawing.grading->multiple;
   }
   if (place * edges % whole != 0)
-    throw SceneError("rod '" + written.name + "': its vertex " + std::to_string(vertex) + " of " + std::to_string(written.edges()) + " edges is no vertex of " +
-                     std::to_string(edges));
+    throw SceneError("rod '" + written.name + "': its vertex " + std::to_string(vertex) + " of " +
+                     std::to_string(written.edges()) + " edges is no vertex of " + std::to_string(edges));
   return int(place * edges / whole);
 }
 
-/// frameAtVertex of second order where the edges on either side differ: the tangent is theirs, each by the length of the other.
+/// frameAtVertex of second order where the edges on either side differ: the tangent is theirs, each by the length of
+/// the other.
 Frame frameBetween(const Rod &rod, int vertex) {
   const int a = rod.edgeBefore(vertex), b = rod.edgeAfter(vertex);
   if (a < 0 || b < 0) return frameAtVertex(rod, vertex);
   const Frame f0 = referenceFrame(rod, a), f1 = referenceFrame(rod, b);
   const Vec3 t = (f1.length * f0.tangent + f0.length * f1.tangent).normalized();
-  const Vec3 d = f1.length * transport<double>(f0.director, f0.tangent, t) + f0.length * transport<double>(f1.director, f1.tangent, t);
+  const Vec3 d = f1.length * transport<double>(f0.director, f0.tangent, t) +
+                 f0.length * transport<double>(f1.director, f1.tangent, t);
   return {t, orthonormalised(d, t), 1};
 }
 
 /// Whether the end of an open rod at a vertex is free to turn, tangent and director.
 bool isFreeEnd(const Scene &scene, int rod, int vertex) {
-  return std::none_of(scene.supports.begin(), scene.supports.end(), [&](const Support &s) { return s.rod == rod && s.vertex == vertex && s.holdsTwist(); });
+  return std::none_of(scene.supports.begin(), scene.supports.end(),
+                      [&](const Support &s) { return s.rod == rod && s.vertex == vertex && s.holdsTwist(); });
 }
 
-void addCouple(const Scene &written, const Drawing &drawing, const EdgeMoment &couple, int edges, std::vector<EdgeMoment> &out) {
+void addCouple(const Scene &written, const Drawing &drawing, const EdgeMoment &couple, int edges,
+               std::vector<EdgeMoment> &out) {
   const Rod &rod = written.rods[couple.rod];
   const Grading *grading = drawing.grading.get();
   const int last = rod.edges() - 1;
-  auto add = [&](int edge, double weight) { out.push_back({couple.rod, edge, weight * couple.torque, weight * couple.moment}); };
-  if (!rod.closed && couple.edge == last && isFreeEnd(written, couple.rod, rod.vertices() - 1)) return add(edges - 1, 1);
+  auto add = [&](int edge, double weight) {
+    out.push_back({couple.rod, edge, weight * couple.torque, weight * couple.moment});
+  };
+  if (!rod.closed && couple.edge == last && isFreeEnd(written, couple.rod, rod.vertices() - 1))
+    return add(edges - 1, 1);
   if (!rod.closed && couple.edge == 0 && isFreeEnd(written, couple.rod, 0)) return add(0, 1);
   const double parameter = (couple.edge + 0.5) / rod.edges();
-  const double place = (grading ? grading->placeOf(parameter) * edges : (couple.edge + 0.5) * edges / rod.edges()) - 0.5;
+  const double place =
+      (grading ? grading->placeOf(parameter) * edges : (couple.edge + 0.5) * edges / rod.edges()) - 0.5;
   const int count = std::min(4, edges);
   int first = int(std::floor(place)) - 1;
   if (!rod.closed) first = std::clamp(first, 0, edges - count);
@@ -112,7 +131,8 @@ void addCouple(const Scene &written, const Drawing &drawing, const EdgeMoment &c
     if (weights[k] != 0) add(wrapped(first + k, edges), weights[k]);
 }
 
-/// Vertices that supports and loads name, without the ends of a rod and the first of a closed one: those are vertices of any number of edges.
+/// Vertices that supports and loads name, without the ends of a rod and the first of a closed one: those are vertices
+/// of any number of edges.
 std::vector<int> namedVertices(const Scene &scene, int r) {
   std::vector<int> named;
   auto add = [&](int rod, int vertex) {
@@ -135,8 +155,12 @@ double twistOf(const Rod &rod) {
 /// The drawings of two rods differ by a translation, as copies do.
 bool areAlike(const Scene &scene, const std::vector<Drawing> &drawings, int a, int b) {
   const Rod &one = scene.rods[a], &two = scene.rods[b];
-  if (one.closed != two.closed || one.vertices() != two.vertices() || bool(drawings[a].curve) != bool(drawings[b].curve)) return false;
-  if (drawings[a].directors_given != drawings[b].directors_given || (drawings[a].directors_given && one.director != two.director)) return false;
+  if (one.closed != two.closed || one.vertices() != two.vertices() ||
+      bool(drawings[a].curve) != bool(drawings[b].curve))
+    return false;
+  if (drawings[a].directors_given != drawings[b].directors_given ||
+      (drawings[a].directors_given && one.director != two.director))
+    return false;
   const Vec3 shift = two.position[0] - one.position[0];
   const double rounding = 1e-12 * ((one.position.back() - one.position[0]).norm() + shift.norm());
   auto near = [&](const Vec3 &x, const Vec3 &y) { return (x + shift - y).norm() <= rounding; };
@@ -152,7 +176,8 @@ bool areAlike(const Scene &scene, const std::vector<Drawing> &drawings, int a, i
 Curve curveThrough(const Rod &rod) {
   const int n = rod.edges();
   std::vector<bool> ends_cubics(rod.vertices());
-  for (int v = 0; v < rod.vertices(); ++v) ends_cubics[v] = rod.edgeBefore(v) < 0 || rod.edgeAfter(v) < 0 || isCorner(rod, v);
+  for (int v = 0; v < rod.vertices(); ++v)
+    ends_cubics[v] = rod.edgeBefore(v) < 0 || rod.edgeAfter(v) < 0 || isCorner(rod, v);
   return [rod, n, ends_cubics](double s) {
     const double place = s * n;
     const int edge = std::clamp(int(std::floor(place)), 0, n - 1);
@@ -237,7 +262,9 @@ Scene redraw(const Scene &written, const std::vector<Drawing> &drawings, const s
   scene.gravity = written.gravity;
   scene.rotation = written.rotation;
   for (std::size_t r = 0; r < written.rods.size(); ++r)
-    scene.rods.push_back(isRedrawn(written.rods[r], drawings[r], edges[r]) ? redrawn(written.rods[r], drawings[r], edges[r]) : written.rods[r]);
+    scene.rods.push_back(isRedrawn(written.rods[r], drawings[r], edges[r])
+                             ? redrawn(written.rods[r], drawings[r], edges[r])
+                             : written.rods[r]);
   for (const Support &support : written.supports) {
     Support &s = scene.supports.emplace_back(support);
     const Rod &rod = scene.rods[s.rod];

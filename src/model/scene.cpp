@@ -13,7 +13,8 @@ double degrees(double radians) { return radians * 180 / pi; }
 std::pair<std::size_t, double> locate(const std::vector<Motion::Key> &table, double time) {
   if (time <= table.front().time) return {0, 0.0};
   if (time >= table.back().time) return {table.size() - 1, 0.0};
-  const auto right = std::upper_bound(table.begin(), table.end(), time, [](double t, const Motion::Key &k) { return t < k.time; });
+  const auto right =
+      std::upper_bound(table.begin(), table.end(), time, [](double t, const Motion::Key &k) { return t < k.time; });
   const std::size_t i = std::size_t(right - table.begin()) - 1;
   return {i, (time - table[i].time) / (table[i + 1].time - table[i].time)};
 }
@@ -25,16 +26,21 @@ Vec3 interpolate(const std::vector<Motion::Key> &table, double time, Vec3 Motion
 
 } // namespace
 
-Vec3 Motion::displacementAt(double time) const { return table.empty() ? Vec3(velocity * time) : interpolate(table, time, &Key::displacement); }
+Vec3 Motion::displacementAt(double time) const {
+  return table.empty() ? Vec3(velocity * time) : interpolate(table, time, &Key::displacement);
+}
 
 Vec3 Motion::velocityAt(double time) const {
   if (table.empty()) return velocity;
   for (std::size_t k = 1; k < table.size(); ++k)
-    if (table[k - 1].time < time && time <= table[k].time) return (table[k].displacement - table[k - 1].displacement) / (table[k].time - table[k - 1].time);
+    if (table[k - 1].time < time && time <= table[k].time)
+      return (table[k].displacement - table[k - 1].displacement) / (table[k].time - table[k - 1].time);
   return Vec3::Zero();
 }
 
-Vec3 Motion::rotationVectorAt(double time) const { return table.empty() ? Vec3(angular_velocity * time) : interpolate(table, time, &Key::rotation); }
+Vec3 Motion::rotationVectorAt(double time) const {
+  return table.empty() ? Vec3(angular_velocity * time) : interpolate(table, time, &Key::rotation);
+}
 
 Mat3 Motion::rotationAt(double time) const {
   const Vec3 r = rotationVectorAt(time);
@@ -63,7 +69,8 @@ std::string shortText(double value) {
 }
 
 bool Scene::stiffnessDissipates() const {
-  return std::any_of(rods.begin(), rods.end(), [](const Rod &rod) { return rod.material.stiffness_damping_coefficient != 0; });
+  return std::any_of(rods.begin(), rods.end(),
+                     [](const Rod &rod) { return rod.material.stiffness_damping_coefficient != 0; });
 }
 
 void setBishopDirectors(Rod &rod, const Vec3 &start) {
@@ -122,21 +129,25 @@ void checkRod(const Rod &rod) {
     throw SceneError(message.str());
   };
   const int minimum = rod.closed ? 3 : 2;
-  if (rod.vertices() < minimum) fail("has ", rod.vertices(), " vertices; a", rod.closed ? " closed" : "n open", " rod needs at least ", minimum);
+  if (rod.vertices() < minimum)
+    fail("has ", rod.vertices(), " vertices; a", rod.closed ? " closed" : "n open", " rod needs at least ", minimum);
   double scale = 0;
   for (const Vec3 &x : rod.position) scale = std::max(scale, (x - rod.position[0]).norm());
   for (int i = 0; i < rod.vertices(); ++i)
     if (!rod.position[i].allFinite()) fail("vertex ", i, " has a coordinate that is not finite");
   for (int i = 0; i < rod.edges(); ++i)
-    if (!std::isfinite(rod.edge(i).norm())) fail("edge ", i, " (vertex ", i, " to ", rod.next(i), ") is too long to compute with; SI units?");
+    if (!std::isfinite(rod.edge(i).norm()))
+      fail("edge ", i, " (vertex ", i, " to ", rod.next(i), ") is too long to compute with; SI units?");
   for (int i = 0; i < rod.edges(); ++i)
-    if (rod.edge(i).norm() <= 1e-12 * scale) fail("edge ", i, " (vertex ", i, " to ", rod.next(i), ") has zero length; remove one of the two vertices");
+    if (rod.edge(i).norm() <= 1e-12 * scale)
+      fail("edge ", i, " (vertex ", i, " to ", rod.next(i), ") has zero length; remove one of the two vertices");
   for (int v = 0; v < rod.vertices(); ++v) {
     const int a = rod.edgeBefore(v), b = rod.edgeAfter(v);
     if (a < 0 || b < 0) continue;
     const double c = rod.edge(a).normalized().dot(rod.edge(b).normalized());
     if (c < -0.9999)
-      fail("folds back on itself at vertex ", v, " (turning angle ", degrees(std::acos(std::max(-1.0, c))), " degrees); edges may turn by less than 179");
+      fail("folds back on itself at vertex ", v, " (turning angle ", degrees(std::acos(std::max(-1.0, c))),
+           " degrees); edges may turn by less than 179");
   }
   if (rod.material.isCable()) return;
   double length = 0, longest = 0; // of a cell
@@ -147,12 +158,19 @@ void checkRod(const Rod &rod) {
   }
   // What one vertex may take: half a turn, of twist only in measure tan.
   const Vec3 natural = rod.natural == Rod::Natural::given ? rod.natural_strain : Vec3::Zero();
-  const double bend = std::hypot(natural[0], natural[1]) * longest, drawn = 2 * pi * std::abs(rod.initial_turns) / length * longest;
-  if (!(bend < pi)) fail("its natural curvature turns it by ", degrees(bend), " degrees at a vertex; use more edges: less than 180 is possible");
+  const double bend = std::hypot(natural[0], natural[1]) * longest,
+               drawn = 2 * pi * std::abs(rod.initial_turns) / length * longest;
+  if (!(bend < pi))
+    fail("its natural curvature turns it by ", degrees(bend),
+         " degrees at a vertex; use more edges: less than 180 is possible");
   if (rod.measure != Measure::tan) return;
   const double twist = std::abs(natural[2]) * longest;
-  if (!(twist < pi)) fail("its natural twist is ", degrees(twist), " degrees at a vertex; measure tan takes less than 180: use more edges, or measure angle");
-  if (!(drawn < pi)) fail("'turns' twist it by ", degrees(drawn), " degrees at a vertex; measure tan takes less than 180: use more edges, or measure angle");
+  if (!(twist < pi))
+    fail("its natural twist is ", degrees(twist),
+         " degrees at a vertex; measure tan takes less than 180: use more edges, or measure angle");
+  if (!(drawn < pi))
+    fail("'turns' twist it by ", degrees(drawn),
+         " degrees at a vertex; measure tan takes less than 180: use more edges, or measure angle");
 }
 
 DimensionlessGroups dimensionlessGroups(const Rod &rod, const Vec3 &gravity) {
@@ -167,8 +185,10 @@ DimensionlessGroups dimensionlessGroups(const Rod &rod, const Vec3 &gravity) {
     const Frame f0 = referenceFrame(rod, a), f1 = referenceFrame(rod, b);
     const double turning = std::acos(std::clamp(f0.tangent.dot(f1.tangent), -1.0, 1.0));
     g.largest_turning = std::max(g.largest_turning, degrees(turning));
-    const double softness = turning * turning * g.length / (g.axial_to_bending * (rod.edge(a).norm() + rod.edge(b).norm()));
-    if (rod.energy == Energy::seed && rod.natural == Rod::Natural::as_drawn && turning > pi / 6 && softness > g.corner_softness) {
+    const double softness =
+        turning * turning * g.length / (g.axial_to_bending * (rod.edge(a).norm() + rod.edge(b).norm()));
+    if (rod.energy == Energy::seed && rod.natural == Rod::Natural::as_drawn && turning > pi / 6 &&
+        softness > g.corner_softness) {
       g.corner_softness = softness;
       g.softest_corner = v;
     }

@@ -18,7 +18,8 @@ void Watch::look() {
   if (std::chrono::duration<double>(now - *told_).count() < wait) return;
   told_ = now;
   std::ostringstream line;
-  line << "working for " << std::chrono::duration_cast<std::chrono::seconds>(now - *since_).count() << " s: " << Activity::all();
+  line << "working for " << std::chrono::duration_cast<std::chrono::seconds>(now - *since_).count()
+       << " s: " << Activity::all();
   tell(line.str());
 }
 

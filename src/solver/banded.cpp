@@ -16,7 +16,8 @@ template <class T> const T *as(const double *p) { return reinterpret_cast<const 
 
 } // namespace
 
-void addMetric(const Planes &metric, const double *edges, const RodRange &rod, double scale, const Planes &v, Planes &y) {
+void addMetric(const Planes &metric, const double *edges, const RodRange &rod, double scale, const Planes &v,
+               Planes &y) {
   for (int a = 0; a < slot_size; ++a)
     for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) y[a][s] += scale * metric[a][s] * v[a][s];
   for (int a = 0; edges && a < 3; ++a)
@@ -28,7 +29,8 @@ void addMetric(const Planes &metric, const double *edges, const RodRange &rod, d
 }
 
 BandedFactor::BandedFactor(const DofMap &dofs, RodSet set, BandedWorkspace &workspace)
-    : dofs_(dofs), rods_(set), order_(set.end - set.begin), held_(order_.size()), negative_(order_.size(), 0), zero_(order_.size(), 0), workspace_(workspace) {
+    : dofs_(dofs), rods_(set), order_(set.end - set.begin), held_(order_.size()), negative_(order_.size(), 0),
+      zero_(order_.size(), 0), workspace_(workspace) {
   const auto &rods = dofs.rods();
   std::size_t rows = 0;
   for (int r = set.begin; r < set.end; ++r) {
@@ -51,11 +53,12 @@ BandedFactor::BandedFactor(const DofMap &dofs, RodSet set, BandedWorkspace &work
 
 bool BandedFactor::sameShape(int a, int b) const {
   const RodRange &one = dofs_.rods()[a], &other = dofs_.rods()[b];
-  return one.vertices == other.vertices && one.closed == other.closed && one.twist == other.twist && held_[a - rods_.begin] == held_[b - rods_.begin];
+  return one.vertices == other.vertices && one.closed == other.closed && one.twist == other.twist &&
+         held_[a - rods_.begin] == held_[b - rods_.begin];
 }
 
-/// Groups of the wanted rods of each shape: whole packs; of the rest, a pack when that is cheaper than one after the other.
-/// Returns how many numbers their factors take.
+/// Groups of the wanted rods of each shape: whole packs; of the rest, a pack when that is cheaper than one after the
+/// other. Returns how many numbers their factors take.
 std::size_t BandedFactor::plan(const char *wanted) {
   constexpr int worth_a_pack = 3;
   groups_.clear();
@@ -64,7 +67,8 @@ std::size_t BandedFactor::plan(const char *wanted) {
     const RodRange &rod = dofs_.rods()[group.rod[0]];
     group.packed = packed;
     group.factor = size;
-    size += packed ? lanes * (vertex_record + rod.edges * Record<Pack>::of(rod)) : vertex_record + rod.edges * Record<double>::of(rod);
+    size += packed ? lanes * (vertex_record + rod.edges * Record<Pack>::of(rod))
+                   : vertex_record + rod.edges * Record<double>::of(rod);
     groups_.push_back(group);
   };
   Group open{};
@@ -120,7 +124,9 @@ template <class T> void BandedFactor::factorGroup(const Group &group, const Band
     else
       return source[0][at] + added(0);
   };
-  auto couplesPositions = [](int plane) { return plane == EdgeBlocks::vertex(0, 1) || plane == EdgeBlocks::vertex(0, 2) || plane == EdgeBlocks::vertex(1, 2); };
+  auto couplesPositions = [](int plane) {
+    return plane == EdgeBlocks::vertex(0, 1) || plane == EdgeBlocks::vertex(0, 2) || plane == EdgeBlocks::vertex(1, 2);
+  };
   auto plain = [&](int plane, int i) {
     if (couplesPositions(plane)) return T(0.0);
     return value(std::size_t(plane) * first.slots + i, [](int) { return 0.0; });
@@ -333,7 +339,9 @@ PetscErrorCode createBandedMatrix(BandedSystem *system, Mat *matrix) {
   PetscFunctionReturn(0);
 }
 
-const BandedFactor *bandedFactorOf(Mat factored) { return factored->ops->choleskyfactornumeric == numeric ? factorOf(factored) : nullptr; }
+const BandedFactor *bandedFactorOf(Mat factored) {
+  return factored->ops->choleskyfactornumeric == numeric ? factorOf(factored) : nullptr;
+}
 
 PetscErrorCode registerBanded() {
   PetscFunctionBeginUser;

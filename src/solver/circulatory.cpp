@@ -4,7 +4,8 @@
 
 namespace tendril {
 
-Circulatory::Circulatory(const IncrementalPotential &potential, RodSet rods) : potential_(potential), rods_(rods), counts_(rods.end - rods.begin) {
+Circulatory::Circulatory(const IncrementalPotential &potential, RodSet rods)
+    : potential_(potential), rods_(rods), counts_(rods.end - rods.begin) {
   for (int r = rods.begin; r < rods.end; ++r)
     for (const EdgeMoment &m : potential.scene().moments) {
       if (m.rod != r) continue;
@@ -15,7 +16,9 @@ Circulatory::Circulatory(const IncrementalPotential &potential, RodSet rods) : p
   solved_.assign(2 * most, potential.dofs().makePlanes());
 }
 
-double Circulatory::Column::dot(const Planes &x) const { return edge.dot(x.vector(0, slot + 1) - x.vector(0, slot)) + twist * x[3][slot]; }
+double Circulatory::Column::dot(const Planes &x) const {
+  return edge.dot(x.vector(0, slot + 1) - x.vector(0, slot)) + twist * x[3][slot];
+}
 
 void Circulatory::Column::addTo(Planes &x) const {
   x.setVector(0, slot, x.vector(0, slot) - edge);
@@ -34,7 +37,8 @@ PetscErrorCode Circulatory::update(const Solve &solve) {
     const double size = moment.norm();
     // Two directions across the moment; their spins are what it turns into each other.
     const Vec3 along = size > 0 ? Vec3(moment / size) : f.tangent, across = along.unitOrthogonal();
-    for (const Vec3 &d : {across, Vec3(along.cross(across))}) columns_.push_back({couple.rod, slot, d.cross(f.tangent) / f.length, d.dot(f.tangent)});
+    for (const Vec3 &d : {across, Vec3(along.cross(across))})
+      columns_.push_back({couple.rod, slot, d.cross(f.tangent) / f.length, d.dot(f.tangent)});
     strength_.push_back(0.5 * size);
   }
   Planes right = potential_.dofs().makePlanes();
@@ -78,7 +82,8 @@ bool Circulatory::correct(Planes &x) const {
     const RodRange &rod = potential_.dofs().rods()[r];
     for (int k = 0; k < n; ++k)
       for (int a = 0; a < slot_size; ++a)
-        for (int s = rod.first_slot; s < rod.vertexEnd() + (rod.closed ? 2 : 0); ++s) x[a][s] -= c[k] * solved_[k][a][s];
+        for (int s = rod.first_slot; s < rod.vertexEnd() + (rod.closed ? 2 : 0); ++s)
+          x[a][s] -= c[k] * solved_[k][a][s];
     first += n;
   }
   return true;

@@ -38,7 +38,8 @@ std::vector<int> keptVertices(const IncrementalPotential &fine, int r) {
       break;
     }
     const Frame drawn = referenceFrame(rod, v);
-    const double here = std::max(between(before, drawn), between(fine.start().frameAt(range.slot(v - 1)), fine.start().frameAt(range.slot(v))));
+    const double here = std::max(between(before, drawn),
+                                 between(fine.start().frameAt(range.slot(v - 1)), fine.start().frameAt(range.slot(v))));
     before = drawn;
     turning += here;
     if (coarsens && !stays[v] && v - kept.back() < stride && turning <= most_turning && !isCorner(rod, v)) continue;
@@ -49,7 +50,9 @@ std::vector<int> keptVertices(const IncrementalPotential &fine, int r) {
 }
 
 /// Director of a coarse edge: that in the middle of the fine edges it stands for.
-Vec3 directorOn(const Frame &f, const Vec3 &tangent) { return orthonormalised(transport<double>(f.director, f.tangent, tangent), tangent); }
+Vec3 directorOn(const Frame &f, const Vec3 &tangent) {
+  return orthonormalised(transport<double>(f.director, f.tangent, tangent), tangent);
+}
 
 struct Coarse {
   RodSet rods;
@@ -65,7 +68,8 @@ struct Coarse {
     scene.gravity = from.gravity;
     scene.rotation = from.rotation;
     for (int r = rods.begin; r < rods.end; ++r) {
-      for (const LooseCell &cell : cellsOf(fine.elements(), r)) turns = turns || std::abs(start[C::twist][cell.slot]) > 1;
+      for (const LooseCell &cell : cellsOf(fine.elements(), r))
+        turns = turns || std::abs(start[C::twist][cell.slot]) > 1;
       const std::vector<int> &keep = kept.emplace_back(keptVertices(fine, r));
       const Rod &rod = from.rods[r];
       Rod &coarse = scene.rods.emplace_back(rod);
@@ -74,8 +78,10 @@ struct Coarse {
       coarse.measure = Measure::angle; // without barriers
       coarse.position.clear();
       coarse.director.clear();
-      for (std::size_t k = 0; k + (rod.closed ? 1 : 0) < keep.size(); ++k) coarse.position.push_back(rod.position[keep[k]]);
-      for (int e = 0; e < coarse.edges(); ++e) coarse.director.push_back(directorOn(referenceFrame(rod, middle(r, e)), coarse.edge(e).normalized()));
+      for (std::size_t k = 0; k + (rod.closed ? 1 : 0) < keep.size(); ++k)
+        coarse.position.push_back(rod.position[keep[k]]);
+      for (int e = 0; e < coarse.edges(); ++e)
+        coarse.director.push_back(directorOn(referenceFrame(rod, middle(r, e)), coarse.edge(e).normalized()));
     }
     worth = !turns && 2 * after < before;
     auto at = [&](int r, int vertex) { // the last kept vertex up to this one, which begins the edge there
@@ -118,7 +124,8 @@ struct Coarse {
         const Vec3 tangent = (start.position[at(e + 1)] - start.position[at(e)]).normalized();
         state.director.push_back(directorOn(fine.start().frameAt(range.slot(middle(r, e))), tangent));
         double force = 0;
-        for (int k = keep[e]; k < keep[e + 1]; ++k) force += start.axial_force[range.first_edge + k] / (keep[e + 1] - keep[e]);
+        for (int k = keep[e]; k < keep[e + 1]; ++k)
+          force += start.axial_force[range.first_edge + k] / (keep[e + 1] - keep[e]);
         state.axial_force.push_back(force);
       }
     }
@@ -128,7 +135,8 @@ struct Coarse {
     return state;
   }
 
-  /// Vertices move as those of the curve through the coarse ones; spins and axial forces are linear between the middles of coarse edges.
+  /// Vertices move as those of the curve through the coarse ones; spins and axial forces are linear between the middles
+  /// of coarse edges.
   void prolong(const IncrementalPotential &fine, const IncrementalPotential &solved, Guess *guess) const {
     guess->unknowns = fine.dofs().makePlanes();
     guess->axial_force = Planes(1, fine.dofs().slots());
@@ -147,9 +155,13 @@ struct Coarse {
       for (int e = 0; e < from.edges; ++e)
         for (int v = keep[e]; v < keep[e + 1]; ++v) {
           const double s = (e + (place[v] - place[keep[e]]) / (place[keep[e + 1]] - place[keep[e]])) / from.edges;
-          guess->unknowns.setVector(0, range.slot(v), v == keep[e] ? solved.iterate().displacementAt(from.slot(e), solved.start()) : Vec3(now(s) - old(s)));
+          guess->unknowns.setVector(0, range.slot(v),
+                                    v == keep[e] ? solved.iterate().displacementAt(from.slot(e), solved.start())
+                                                 : Vec3(now(s) - old(s)));
         }
-      if (!range.closed) guess->unknowns.setVector(0, range.slot(range.edges), solved.iterate().displacementAt(from.slot(from.edges), solved.start()));
+      if (!range.closed)
+        guess->unknowns.setVector(0, range.slot(range.edges),
+                                  solved.iterate().displacementAt(from.slot(from.edges), solved.start()));
       std::vector<double> spin(from.edges);
       for (int e = 0; from.twist && e < from.edges; e += lanes) {
         const Pack spun = spinOver(solved.start(), solved.iterate(), from.slot(e));
@@ -166,7 +178,8 @@ struct Coarse {
         const int a = (e + n) % n, b = (e + 1) % n;
         const double t = n > 1 ? (s - middleOf(e)) / (middleOf(e + 1) - middleOf(e)) : 0;
         guess->unknowns[3][range.slot(i)] = (1 - t) * spin[a] + t * spin[b];
-        guess->axial_force[0][range.slot(i)] = (1 - t) * solved.iterate()[C::axial_force][from.slot(a)] + t * solved.iterate()[C::axial_force][from.slot(b)];
+        guess->axial_force[0][range.slot(i)] = (1 - t) * solved.iterate()[C::axial_force][from.slot(a)] +
+                                               t * solved.iterate()[C::axial_force][from.slot(b)];
       }
     }
   }
@@ -174,12 +187,15 @@ struct Coarse {
 
 } // namespace
 
-PetscErrorCode solveCoarse(const IncrementalPotential &fine, const State &start, RodSet rods, Guess *guess, NewtonReport *report) {
+PetscErrorCode solveCoarse(const IncrementalPotential &fine, const State &start, RodSet rods, Guess *guess,
+                           NewtonReport *report) {
   PetscFunctionBeginUser;
   *report = {};
   Coarse coarse(fine, rods);
   if (!coarse.worth) PetscFunctionReturn(0);
-  const Doing here([&](std::ostream &out) { out << "with fewer edges, " << coarse.scene.rods[0].edges() << " of rod '" << coarse.scene.rods[0].name << "'"; });
+  const Doing here([&](std::ostream &out) {
+    out << "with fewer edges, " << coarse.scene.rods[0].edges() << " of rod '" << coarse.scene.rods[0].name << "'";
+  });
   DofMap dofs;
   PetscCall(dofs.setUp(coarse.scene));
   const Elements elements(coarse.scene, dofs);

@@ -28,7 +28,9 @@ Residual residualOf(IncrementalPotential &potential, int rod) { return potential
 
 } // namespace
 
-std::string labelOf(const Rod &rod) { return "rod '" + rod.name + "' (" + std::to_string(rod.edges()) + (rod.edges() == 1 ? " edge)" : " edges)"); }
+std::string labelOf(const Rod &rod) {
+  return "rod '" + rod.name + "' (" + std::to_string(rod.edges()) + (rod.edges() == 1 ? " edge)" : " edges)");
+}
 
 std::string imbalanceOf(IncrementalPotential &potential, int r, const Asked &asked) {
   const RodRange &rod = potential.elements().rods[r];
@@ -37,7 +39,8 @@ std::string imbalanceOf(IncrementalPotential &potential, int r, const Asked &ask
   const double *freedom = potential.elements().freedom(), scale = potential.forceScale(r);
   std::ostringstream text;
   text << std::setprecision(4);
-  auto say = [&](const std::string &what, double value, const std::string &of, double tolerance, const std::string &option, const char *place, int where) {
+  auto say = [&](const std::string &what, double value, const std::string &of, double tolerance,
+                 const std::string &option, const char *place, int where) {
     if (value <= tolerance) return;
     text << (text.str().empty() ? "" : ", ") << what;
     if (std::isfinite(value)) {
@@ -51,16 +54,18 @@ std::string imbalanceOf(IncrementalPotential &potential, int r, const Asked &ask
   std::ostringstream load, moment;
   load << std::setprecision(4) << " of " << (potential.hasLoad(r) ? "its load of " : "") << scale << " N"
        << (potential.hasLoad(r) ? "" : ", which deforms it,");
-  moment << std::setprecision(4) << " of " << scale * potential.length(r) << " N m, " << (potential.hasLoad(r) ? "its load" : "that") << " times its length,";
+  moment << std::setprecision(4) << " of " << scale * potential.length(r) << " N m, "
+         << (potential.hasLoad(r) ? "its load" : "that") << " times its length,";
   say("forces out of balance", residual.force, load.str(), asked.rtol, "-snes_rtol", "vertex",
       largestOf(rod.vertices, [&](int i) { return freedom[rod.slot(i)] * force.vector(0, rod.slot(i)).norm(); }));
   say("moments out of balance", residual.moment, moment.str(), asked.rtol, "-snes_rtol", "edge",
       largestOf(rod.edges, [&](int i) { return std::abs(force[3][rod.slot(i)]); }));
   const Configuration &c = potential.iterate();
-  say("strains of -stretch mixed off", residual.compatibility, "", compatibility_rtol * asked.rtol, "1e-4 of -snes_rtol", "edge",
-      largestOf(rod.edges, [&](int i) {
+  say("strains of -stretch mixed off", residual.compatibility, "", compatibility_rtol * asked.rtol,
+      "1e-4 of -snes_rtol", "edge", largestOf(rod.edges, [&](int i) {
         const int s = rod.slot(i);
-        return std::abs(c[Configuration::strain][s] - potential.axial().rest()[s] - c[Configuration::axial_force][s] / potential.axial().stiffness()[s]);
+        return std::abs(c[Configuration::strain][s] - potential.axial().rest()[s] -
+                        c[Configuration::axial_force][s] / potential.axial().stiffness()[s]);
       }));
   return text.str();
 }

@@ -22,8 +22,9 @@ std::vector<double> loads(const Scene &scene, const std::vector<double> &length)
     double s = rod.gravity ? rod.material.linear_density * length[r] * scene.gravity.norm() : 0;
     s += rod.material.linear_density * length[r] * length[r] * scene.rotation.angular_velocity.squaredNorm();
     auto held = [&](int vertex) {
-      return std::any_of(scene.supports.begin(), scene.supports.end(),
-                         [&](const Support &support) { return support.rod == int(r) && support.vertex == vertex && support.holdsPosition(); });
+      return std::any_of(scene.supports.begin(), scene.supports.end(), [&](const Support &support) {
+        return support.rod == int(r) && support.vertex == vertex && support.holdsPosition();
+      });
     };
     std::map<int, Vec3> force; // per vertex: forces that cancel are none
     for (const NodalForce &f : scene.forces)
@@ -42,8 +43,9 @@ std::vector<double> loads(const Scene &scene, const std::vector<double> &length)
 using C = Configuration;
 
 IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, const Elements &elements, bool dynamic)
-    : scene_(scene), dofs_(dofs), elements_(elements), retraction_(elements), axial_(scene, elements), terms_(makeTerms(scene, elements, axial_, dynamic)),
-      start_(elements.slots), known_(elements.rods.size(), Known::nothing) {
+    : scene_(scene), dofs_(dofs), elements_(elements), retraction_(elements), axial_(scene, elements),
+      terms_(makeTerms(scene, elements, axial_, dynamic)), start_(elements.slots),
+      known_(elements.rods.size(), Known::nothing) {
   for (std::size_t r = 0; r < elements.rods.size(); ++r) {
     const RodRange &rod = elements.rods[r];
     double sum = 0, shortest = HUGE_VAL, longest = 0, bending = 0, cell = HUGE_VAL;
@@ -95,7 +97,8 @@ void IncrementalPotential::setLoadFactor(double factor) {
 }
 
 /// The force that measures a rod's residual: its loads. A rod without any is measured by the force that deforms it,
-/// the smallest of EI/L^2, GJ/L^2 and 1e-4 EA, or, where that is smaller, by the force that would stop it within the step.
+/// the smallest of EI/L^2, GJ/L^2 and 1e-4 EA, or, where that is smaller, by the force that would stop it within the
+/// step.
 double IncrementalPotential::forceScale(const State &start, int r) const {
   if (load_[r] > 0) return load_[r];
   const Material &m = scene_.rods[r].material;
@@ -107,7 +110,8 @@ double IncrementalPotential::forceScale(const State &start, int r) const {
   const double scale = softest / (length_[r] * length_[r]);
   if (step_.isStatic()) return scale;
   double momentum = 0;
-  for (int i = 0; i < rod.vertices; ++i) momentum += elements_.mass()[rod.slot(i)] * start.velocity[rod.first_vertex + i].norm();
+  for (int i = 0; i < rod.vertices; ++i)
+    momentum += elements_.mass()[rod.slot(i)] * start.velocity[rod.first_vertex + i].norm();
   return momentum > 0 ? std::min(scale, momentum / step_.dt) : scale;
 }
 
@@ -180,12 +184,14 @@ double IncrementalPotential::reachOf(const Configuration &c, const RodRange &rod
   using std::abs;
   Pack reach(0.0);
   for (int a = 0; a < 3; ++a)
-    for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) reach = max(reach, abs(read<Pack>(c[C::Plane(C::position + a)] + s)));
+    for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes)
+      reach = max(reach, abs(read<Pack>(c[C::Plane(C::position + a)] + s)));
   return hmax(reach);
 }
 
-/// How much stiffer than at rest the steepest cell of a rod is: near 180 degrees of fold or twist the measure `tan` grows without bound, with the
-/// square of its slope 1/cos^2 of half the angle, and so does what rounding leaves in forces.
+/// How much stiffer than at rest the steepest cell of a rod is: near 180 degrees of fold or twist the measure `tan`
+/// grows without bound, with the square of its slope 1/cos^2 of half the angle, and so does what rounding leaves in
+/// forces.
 double IncrementalPotential::steepnessOf(const Configuration &c, int r) const {
   if (elements_.measure[r] != Measure::tan) return 1;
   double flattest = 1;
@@ -202,8 +208,8 @@ double IncrementalPotential::steepnessOf(const Configuration &c, int r) const {
   return 1 / std::max(flattest * flattest, epsilon);
 }
 
-/// Edges carry an error of delta = epsilon in their length and direction: each costs (force + stiffness delta) delta of energy per length. On top of it
-/// comes the rounding of the sums.
+/// Edges carry an error of delta = epsilon in their length and direction: each costs (force + stiffness delta) delta of
+/// energy per length. On top of it comes the rounding of the sums.
 IncrementalPotential::RodEnergy IncrementalPotential::rodEnergy(const Configuration &c, int r) const {
   using std::abs;
   const RodRange &rod = elements_.rods[r];
@@ -221,7 +227,8 @@ IncrementalPotential::RodEnergy IncrementalPotential::rodEnergy(const Configurat
     const double energy = term->energy(c, r);
     result.value += energy;
     result.size += std::abs(energy);
-    result.noise += 64 * epsilon * std::abs(energy) + delta * (std::sqrt(2 * std::abs(energy) * bending) + bending * delta);
+    result.noise +=
+        64 * epsilon * std::abs(energy) + delta * (std::sqrt(2 * std::abs(energy) * bending) + bending * delta);
   }
   if (!std::isfinite(result.value)) result = {};
   return result;
@@ -238,11 +245,13 @@ void IncrementalPotential::assembleRod(int r, HessianKind hessian) {
   const RodRange &rod = elements_.rods[r];
   Derivatives &d = derivatives_;
   for (int a = 0; a < slot_size; ++a)
-    for (Planes *p : {&d.gradient, &d.equilibrium}) std::fill((*p)[a] + rod.first_slot - 1, (*p)[a] + rod.first_slot + rod.slots - 1, 0.0);
+    for (Planes *p : {&d.gradient, &d.equilibrium})
+      std::fill((*p)[a] + rod.first_slot - 1, (*p)[a] + rod.first_slot + rod.slots - 1, 0.0);
   if (hessian != HessianKind::none) d.blocks.clear(rod);
   for (const auto &term : terms_) term->addDerivatives(iterate_, r, d, hessian);
   for (int a = 0; a < slot_size; ++a)
-    for (int s = rod.first_slot; s < rod.vertexEnd() + 2; s += lanes) addTo(d.gradient[a] + s, read<Pack>(d.equilibrium[a] + s));
+    for (int s = rod.first_slot; s < rod.vertexEnd() + 2; s += lanes)
+      addTo(d.gradient[a] + s, read<Pack>(d.equilibrium[a] + s));
   dofs_.fold(rod, d.gradient);
   dofs_.fold(rod, d.equilibrium);
   if (hessian != HessianKind::none) d.blocks.fold(rod);
@@ -279,7 +288,8 @@ const Derivatives &IncrementalPotential::gradient(int r) {
 
 void IncrementalPotential::resetAxialForces(int r) {
   const RodRange &rod = elements_.rods[r];
-  for (int i = rod.first_slot; i < rod.edgeEnd(); ++i) iterate_[C::axial_force][i] = axial_.stiffness()[i] * (iterate_[C::strain][i] - axial_.rest()[i]);
+  for (int i = rod.first_slot; i < rod.edgeEnd(); ++i)
+    iterate_[C::axial_force][i] = axial_.stiffness()[i] * (iterate_[C::strain][i] - axial_.rest()[i]);
   known_[r] = Known::nothing;
 }
 
@@ -291,7 +301,8 @@ void IncrementalPotential::setAxialForces(int r, const double *force) {
   known_[r] = Known::nothing;
 }
 
-bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r, RetractionKind kind, Configuration &trial) {
+bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r, RetractionKind kind,
+                                   Configuration &trial) {
   if (trial.empty()) trial = iterate_;
   trial.copyEnds(elements_, r, iterate_);
   if (!retraction_.apply(iterate_, increment, scale, r, kind, trial)) return false;
@@ -304,8 +315,10 @@ bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r,
       continue;
     }
     // dS = k (B d + c): the force the linearised strain asks for.
-    const Pack inverse = read<Pack>(elements_.inverseRestLength() + i), force = read<Pack>(iterate_[C::axial_force] + i);
-    const Vector3<Pack> de = readVector<Pack>(increment, 0, i + 1) - readVector<Pack>(increment, 0, i), t = readVector<Pack>(iterate_.values(), C::tangent, i);
+    const Pack inverse = read<Pack>(elements_.inverseRestLength() + i),
+               force = read<Pack>(iterate_[C::axial_force] + i);
+    const Vector3<Pack> de = readVector<Pack>(increment, 0, i + 1) - readVector<Pack>(increment, 0, i),
+                        t = readVector<Pack>(iterate_.values(), C::tangent, i);
     const Pack length = read<Pack>(iterate_[C::length] + i);
     Pack change = length * t.dot(de);
     if (kind == RetractionKind::continued) change -= Pack(0.5) * de.squaredNorm();
@@ -313,7 +326,8 @@ bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r,
       write(trial[C::axial_force] + i, force);
       continue;
     }
-    const Pack strain = read<Pack>(iterate_[C::strain] + i) + change * inverse * strainSlope<Pack>(energy, length, inverse);
+    const Pack strain =
+        read<Pack>(iterate_[C::strain] + i) + change * inverse * strainSlope<Pack>(energy, length, inverse);
     write(trial[C::axial_force] + i, Pack(force + Pack(scale) * (stiffness * (strain - rest) - force)));
   }
   return true;
@@ -344,7 +358,8 @@ void IncrementalPotential::coordinates(Planes &x, RodSet rods) const {
       const double *low = iterate_[C::Plane(C::position_low + a)], *low_before = start_[C::Plane(C::position_low + a)];
       for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) x[a][s] = (now[s] - before[s]) + (low[s] - low_before[s]);
     }
-    if (rod.twist) std::copy(iterate_[C::spin] + rod.first_slot, iterate_[C::spin] + rod.edgeEnd(), x[3] + rod.first_slot);
+    if (rod.twist)
+      std::copy(iterate_[C::spin] + rod.first_slot, iterate_[C::spin] + rod.edgeEnd(), x[3] + rod.first_slot);
   }
 }
 
@@ -379,31 +394,35 @@ IncrementalPotential::Residual IncrementalPotential::residual(int r, const RodEn
   }
   for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
     const Pack::mask_type live = firstLanes(rod.edgeEnd() - s);
-    const Pack force = read<Pack>(iterate_[C::axial_force] + s), strain = read<Pack>(iterate_[C::strain] + s) - read<Pack>(axial_.rest() + s);
+    const Pack force = read<Pack>(iterate_[C::axial_force] + s),
+               strain = read<Pack>(iterate_[C::strain] + s) - read<Pack>(axial_.rest() + s);
     tension = max(tension, select(live, Pack(abs(force)), Pack(0.0)));
     error = max(error, select(live, Pack(abs(strain - force / read<Pack>(axial_.stiffness() + s))), Pack(0.0)));
   }
   const double force = reduce(forces), moment = reduce(moments);
   // Edges carry errors of epsilon in their strains and directions, which the stiffnesses turn into forces and moments.
   const double strain_noise = edgeError(energy.reach, shortest_[r]), count = std::sqrt(double(rod.vertices));
-  const double bending = energy.steepness * std::max({m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness}) / shortest_[r];
+  const double bending = energy.steepness *
+                         std::max({m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness}) /
+                         shortest_[r];
   const double scale = force_scale_[r], stretching = step_.mixed ? hmax(tension) : hmax(tension) + m.axial_stiffness;
   Residual result;
   result.force = std::sqrt(force) / scale;
   result.moment = std::sqrt(moment) / (scale * length_[r]);
   result.compatibility = step_.mixed ? hmax(error) : 0;
   // Inertia turns an error of position or twist into a force or a moment, which counts in short steps.
-  const double inertia = step_.isStatic() ? 0 : longest_[r] / (step_.dt * step_.dt), heavy = m.linear_density * shortest_[r] * inertia,
-               spinning = m.linear_rotational_inertia * inertia;
-  result.force_floor = 4 * count * strain_noise * (stretching + heavy + (m.isCable() ? 0 : bending / shortest_[r])) / scale;
+  const double inertia = step_.isStatic() ? 0 : longest_[r] / (step_.dt * step_.dt),
+               heavy = m.linear_density * shortest_[r] * inertia, spinning = m.linear_rotational_inertia * inertia;
+  result.force_floor =
+      4 * count * strain_noise * (stretching + heavy + (m.isCable() ? 0 : bending / shortest_[r])) / scale;
   if (!m.isCable()) result.moment_floor = 4 * count * strain_noise * (bending + spinning) / (scale * length_[r]);
   result.compatibility_floor = 16 * strain_noise;
   return result;
 }
 
 void IncrementalPotential::Residual::include(const Residual &other) {
-  for (double Residual::*part :
-       {&Residual::force, &Residual::moment, &Residual::compatibility, &Residual::force_floor, &Residual::moment_floor, &Residual::compatibility_floor})
+  for (double Residual::*part : {&Residual::force, &Residual::moment, &Residual::compatibility, &Residual::force_floor,
+                                 &Residual::moment_floor, &Residual::compatibility_floor})
     if (other.*part > this->*part || std::isnan(other.*part)) this->*part = other.*part;
 }
 
@@ -446,26 +465,30 @@ std::array<Vec3, 2> IncrementalPotential::supportAction(const State &start, int 
   const Support &support = scene_.supports[s];
   std::array<Vec3, 2> action{Vec3::Zero(), Vec3::Zero()};
   if (support.holdsPosition()) {
-    const int slot = elements_.rods[support.rod].slot(support.vertex), v = elements_.rods[support.rod].first_vertex + support.vertex;
+    const int slot = elements_.rods[support.rod].slot(support.vertex),
+              v = elements_.rods[support.rod].first_vertex + support.vertex;
     const Vec3 moved = iterate_.displacementAt(slot, start_);
     Vec3 velocity = moved / step_.dt, acceleration = (velocity - start.velocity[v]) / step_.dt;
     if (const StageRule *rule = step_.rule) {
       velocity += rule->velocity.atVertex(v);
       acceleration = (rule->mass * velocity + rule->acceleration.atVertex(v)) / step_.dt;
     }
-    // What methods remember of held vertices is nothing, which does not matter to them: the velocity that dissipates is that of the way.
+    // What methods remember of held vertices is nothing, which does not matter to them: the velocity that dissipates is
+    // that of the way.
     const Vec3 astray = moved / (step_.time - start_time_) - velocity;
     const double alpha = scene_.rods[support.rod].material.mass_damping_coefficient;
-    action[0] = gradient(support.rod).equilibrium.vector(0, slot) + elements_.mass()[slot] * (alpha * astray - acceleration);
+    action[0] =
+        gradient(support.rod).equilibrium.vector(0, slot) + elements_.mass()[slot] * (alpha * astray - acceleration);
   }
   if (const int frame = elements_.support_slot[s]; frame >= 0)
     for (const auto &term : terms_) action[1] += term->momentOn(iterate_, support.rod, frame);
   return action;
 }
 
-/// From the middle of a step an edge at the start, in the middle and at the end lies in one plane, so that the minimal rotations of the two halves make up
-/// that of the whole step: its spin over the step is twice that over its half, with no holonomy between. Where the guess goes along a curve, the spin is
-/// measured from the frames carried along it, by a second move.
+/// From the middle of a step an edge at the start, in the middle and at the end lies in one plane, so that the minimal
+/// rotations of the two halves make up that of the whole step: its spin over the step is twice that over its half, with
+/// no holonomy between. Where the guess goes along a curve, the spin is measured from the frames carried along it, by a
+/// second move.
 bool IncrementalPotential::moveOn(double time, const StageRule &end) {
   Planes increment = dofs_.makePlanes();
   Configuration trial;
@@ -475,10 +498,12 @@ bool IncrementalPotential::moveOn(double time, const StageRule &end) {
   for (int r = 0; r < all().end; ++r) {
     const RodRange &rod = elements_.rods[r];
     for (int i = 0; i < rod.vertices; ++i)
-      increment.setVector(0, rod.slot(i), end.guess.atVertex(rod.first_vertex + i) - iterate_.displacementAt(rod.slot(i), start_));
+      increment.setVector(0, rod.slot(i),
+                          end.guess.atVertex(rod.first_vertex + i) - iterate_.displacementAt(rod.slot(i), start_));
     for (int i = 0; rod.twist && i < rod.edges; i += lanes) {
       const Pack spun = spinOver(twistReference(), iterate_, rod.slot(i));
-      for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) increment[3][rod.slot(i + l)] = end.guess.atEdge(rod.first_edge + i + l) - spun[l];
+      for (int l = 0; l < std::min(lanes, rod.edges - i); ++l)
+        increment[3][rod.slot(i + l)] = end.guess.atEdge(rod.first_edge + i + l) - spun[l];
     }
     dofs_.copyBehindRing(rod, increment);
   }
@@ -493,13 +518,15 @@ bool IncrementalPotential::moveOn(double time, const StageRule &end) {
       for (int i = 0; i < rod.vertices; ++i) increment.setVector(0, rod.slot(i), Vec3::Zero());
       for (int i = 0; i < rod.edges; i += lanes) {
         const Pack spun = spinOver(reference_, iterate_, rod.slot(i));
-        for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) increment[3][rod.slot(i + l)] = end.guess.atEdge(rod.first_edge + i + l) - spun[l];
+        for (int l = 0; l < std::min(lanes, rod.edges - i); ++l)
+          increment[3][rod.slot(i + l)] = end.guess.atEdge(rod.first_edge + i + l) - spun[l];
       }
       dofs_.copyBehindRing(rod, increment);
       if (!tryMove(increment, 1, r, RetractionKind::additive, trial)) return false;
       accept(trial, r);
     }
-    for (int s = rod.first_slot; s < rod.edgeEnd(); ++s) iterate_[C::axial_force][s] = elements_.axialStiffness()[s] * iterate_[C::strain][s];
+    for (int s = rod.first_slot; s < rod.edgeEnd(); ++s)
+      iterate_[C::axial_force][s] = elements_.axialStiffness()[s] * iterate_[C::strain][s];
   }
   return !beyond_barrier_;
 }
@@ -509,9 +536,12 @@ void IncrementalPotential::commit(State &state, RodSet rods) const {
     const RodRange &rod = elements_.rods[r];
     const double rate = 1 / step_.dt;
     for (int a = 0; a < 3; ++a) { // plane by plane
-      const double *now = iterate_[C::Plane(C::position + a)] + rod.first_slot, *before = start_[C::Plane(C::position + a)] + rod.first_slot;
-      const double *low = iterate_[C::Plane(C::position_low + a)] + rod.first_slot, *low_before = start_[C::Plane(C::position_low + a)] + rod.first_slot;
-      for (int i = 0; i < rod.vertices; ++i) state.velocity[rod.first_vertex + i][a] = ((now[i] - before[i]) + (low[i] - low_before[i])) * rate;
+      const double *now = iterate_[C::Plane(C::position + a)] + rod.first_slot,
+                   *before = start_[C::Plane(C::position + a)] + rod.first_slot;
+      const double *low = iterate_[C::Plane(C::position_low + a)] + rod.first_slot,
+                   *low_before = start_[C::Plane(C::position_low + a)] + rod.first_slot;
+      for (int i = 0; i < rod.vertices; ++i)
+        state.velocity[rod.first_vertex + i][a] = ((now[i] - before[i]) + (low[i] - low_before[i])) * rate;
     }
     for (int i = 0; i < rod.edges; i += lanes) {
       const Pack spun = spinOver(start_, iterate_, rod.slot(i)) * Pack(rate);
@@ -524,9 +554,11 @@ void IncrementalPotential::commit(State &state, RodSet rods) const {
 [[gnu::flatten]] void IncrementalPotential::commitConfiguration(State &state, RodSet rods) const {
   for (int r = rods.begin; r < rods.end; ++r) {
     const RodRange &rod = elements_.rods[r];
-    for (int n = elements_.rod_cells[r]; n < elements_.rod_cells[r + 1]; ++n) state.turns[n] = iterate_[C::turns][elements_.cell_slot[n]];
+    for (int n = elements_.rod_cells[r]; n < elements_.rod_cells[r + 1]; ++n)
+      state.turns[n] = iterate_[C::turns][elements_.cell_slot[n]];
     for (int a = 0; a < 3; ++a) { // plane by plane
-      const double *high = iterate_[C::Plane(C::position + a)] + rod.first_slot, *low = iterate_[C::Plane(C::position_low + a)] + rod.first_slot;
+      const double *high = iterate_[C::Plane(C::position + a)] + rod.first_slot,
+                   *low = iterate_[C::Plane(C::position_low + a)] + rod.first_slot;
       for (int i = 0; i < rod.vertices; ++i) {
         state.position[rod.first_vertex + i][a] = high[i];
         state.position_low[rod.first_vertex + i][a] = low[i];

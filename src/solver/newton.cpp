@@ -18,11 +18,16 @@ namespace {
 
 constexpr const char *line_search_name = "retraction";
 
-PetscErrorCode functionCallback(SNES, Vec x, Vec f, void *context) { return static_cast<NewtonSolver *>(context)->evaluate(x, f); }
+PetscErrorCode functionCallback(SNES, Vec x, Vec f, void *context) {
+  return static_cast<NewtonSolver *>(context)->evaluate(x, f);
+}
 
-PetscErrorCode jacobianCallback(SNES, Vec, Mat, Mat p, void *context) { return static_cast<NewtonSolver *>(context)->assemble(p); }
+PetscErrorCode jacobianCallback(SNES, Vec, Mat, Mat p, void *context) {
+  return static_cast<NewtonSolver *>(context)->assemble(p);
+}
 
-PetscErrorCode convergenceCallback(SNES, PetscInt it, PetscReal, PetscReal, PetscReal, SNESConvergedReason *reason, void *context) {
+PetscErrorCode convergenceCallback(SNES, PetscInt it, PetscReal, PetscReal, PetscReal, SNESConvergedReason *reason,
+                                   void *context) {
   return static_cast<NewtonSolver *>(context)->testConvergence(it, reason);
 }
 
@@ -42,8 +47,9 @@ PetscErrorCode createLineSearch(SNESLineSearch search) {
   PetscFunctionReturn(0);
 }
 
-/// Diagonal by which an indefinite Hessian is shifted: the mass of each position, and for twists a moment of the same mass over the
-/// edge's length, so that both see curvature on the scale of an edge alike. Independent of units and of the time step.
+/// Diagonal by which an indefinite Hessian is shifted: the mass of each position, and for twists a moment of the same
+/// mass over the edge's length, so that both see curvature on the scale of an edge alike. Independent of units and of
+/// the time step.
 Planes shiftMetric(const Elements &e, const DofMap &dofs) {
   Planes metric = dofs.makePlanes();
   const double *mass = e.mass(), *length = e.restLength();
@@ -51,13 +57,15 @@ Planes shiftMetric(const Elements &e, const DofMap &dofs) {
     for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) metric.setVector(0, s, Vec3::Constant(mass[s]));
     if (rod.twist)
       for (int i = 0; i < rod.edges; ++i)
-        metric[3][rod.slot(i)] = 0.5 * (mass[rod.slot(i)] + mass[rod.slot((i + 1) % rod.vertices)]) * std::pow(length[rod.slot(i)], 2);
+        metric[3][rod.slot(i)] =
+            0.5 * (mass[rod.slot(i)] + mass[rod.slot((i + 1) % rod.vertices)]) * std::pow(length[rod.slot(i)], 2);
   }
   return metric;
 }
 
-/// Beside the mass, a tension in all edges, of which the slowest wave of a string as long as the rod has the frequency that the mass alone gives it: a shift
-/// of the mass alone moves what is held and what hangs on it by the same, however short the edge between, and lets waves as short as edges buckle first.
+/// Beside the mass, a tension in all edges, of which the slowest wave of a string as long as the rod has the frequency
+/// that the mass alone gives it: a shift of the mass alone moves what is held and what hangs on it by the same, however
+/// short the edge between, and lets waves as short as edges buckle first.
 std::vector<double> edgeMetric(const IncrementalPotential &potential) {
   const Elements &e = potential.elements();
   std::vector<double> metric(e.slots + lanes, 0.0);
@@ -73,8 +81,8 @@ std::vector<double> edgeMetric(const IncrementalPotential &potential) {
   return metric;
 }
 
-/// MUMPS counts pivots only when it looks for null ones, and a large pivot leaves their variables out. Options of the same
-/// names (options/mumps_inertia.yaml) go before these values: PETSc reads them later.
+/// MUMPS counts pivots only when it looks for null ones, and a large pivot leaves their variables out. Options of the
+/// same names (options/mumps_inertia.yaml) go before these values: PETSc reads them later.
 PetscErrorCode askMumpsForInertia([[maybe_unused]] PC pc, [[maybe_unused]] Mat matrix) {
   PetscFunctionBeginUser;
 #if defined(PETSC_HAVE_MUMPS)
@@ -91,10 +99,11 @@ PetscErrorCode askMumpsForInertia([[maybe_unused]] PC pc, [[maybe_unused]] Mat m
 } // namespace
 
 NewtonWork::NewtonWork(const IncrementalPotential &potential, int slots)
-    : wanted(potential.all().end, true), shift(wanted.size(), 0), last_shift(shift), negative(wanted.size(), 0), zero(negative),
-      indefinite(wanted.size(), false), energy(wanted.size()), energy_known(wanted.size(), false), residual(wanted.size()), moving(wanted.size(), false),
-      standstill(wanted.size()), left(wanted.size(), 0), load_reach(wanted.size(), 0), load_energy(wanted.size(), 0), increment(slot_size, slots),
-      coordinates(increment), trial(slots), motion(potential.dofs().makePlanes()), metric(shiftMetric(potential.elements(), potential.dofs())),
+    : wanted(potential.all().end, true), shift(wanted.size(), 0), last_shift(shift), negative(wanted.size(), 0),
+      zero(negative), indefinite(wanted.size(), false), energy(wanted.size()), energy_known(wanted.size(), false),
+      residual(wanted.size()), moving(wanted.size(), false), standstill(wanted.size()), left(wanted.size(), 0),
+      load_reach(wanted.size(), 0), load_energy(wanted.size(), 0), increment(slot_size, slots), coordinates(increment),
+      trial(slots), motion(potential.dofs().makePlanes()), metric(shiftMetric(potential.elements(), potential.dofs())),
       edge_metric(edgeMetric(potential)) {}
 
 void NewtonWork::setOrigin(int first_slot) {
@@ -121,7 +130,8 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
   DofMap &dofs = potential.dofs();
   work_ = &work;
   if (circulatory_.emplace(potential, set); circulatory_->isNone()) circulatory_.reset();
-  system_ = {&dofs, set, &potential.blocks(), &work.metric, &work.wanted, &work.shift, &work.workspace, !potential.scene().rotation.angular_velocity.isZero(0)};
+  system_ = {&dofs,        set,         &potential.blocks(), &work.metric,
+             &work.wanted, &work.shift, &work.workspace,     !potential.scene().rotation.angular_velocity.isZero(0)};
   const bool whole = set.begin == 0 && set.end == dofs.all().end;
   if (whole)
     PetscCall(DMCreateGlobalVector(dofs.dm(), x_.out()));
@@ -145,7 +155,8 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
   PetscCall(PCSetType(pc, PCCHOLESKY));
   PetscCall(PCFactorSetMatSolverType(pc, "banded"));
   PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGNATURAL));
-  PetscCall(PCFactorSetZeroPivot(pc, 1e-250)); // for PETSc's own: pivots have the units of a stiffness, no absolute bound makes sense
+  PetscCall(PCFactorSetZeroPivot(
+      pc, 1e-250)); // for PETSc's own: pivots have the units of a stiffness, no absolute bound makes sense
   PetscCall(SNESSetFromOptions(snes_));
   MatSolverType type = nullptr;
   PetscBool cholesky;
@@ -213,12 +224,14 @@ PetscErrorCode NewtonSolver::evaluate(Vec x, Vec f) {
   PetscFunctionBeginUser;
   PetscCall(moveTo(x));
   PetscCall(PetscLogEventBegin(events().derivatives, 0, 0, 0, 0));
-  // Newton squares a small residual: from below the root of the tolerance the next iterate is taken for an answer, which needs no Hessian.
+  // Newton squares a small residual: from below the root of the tolerance the next iterate is taken for an answer,
+  // which needs no Hessian.
   const Derivatives *d = nullptr;
   for (int r = rods_.begin; r < rods_.end; ++r) {
     if (!work_->wanted[r]) continue;
     const IncrementalPotential::Residual &last = work_->residual[r];
-    d = std::max(last.force, last.moment) < likely_ || sharesFactor() ? &potential_->gradient(r) : &potential_->derivatives({r, r + 1});
+    d = std::max(last.force, last.moment) < likely_ || sharesFactor() ? &potential_->gradient(r)
+                                                                      : &potential_->derivatives({r, r + 1});
   }
   PetscCall(PetscLogEventEnd(events().derivatives, 0, 0, 0, 0));
   if (d) PetscCall(potential_->dofs().gather(d->gradient, rods_, f, &work_->wanted));
@@ -228,7 +241,8 @@ PetscErrorCode NewtonSolver::evaluate(Vec x, Vec f) {
 /// Whether the next iteration may do with the factorisation that there is.
 bool NewtonSolver::sharesFactor() const {
   return age_ > 0 && age_ < potential_->settings.quasi_newton && !renew_ && !circulatory_ &&
-         std::none_of(work_->moving.begin() + rods_.begin, work_->moving.begin() + rods_.end, [](char moving) { return moving; });
+         std::none_of(work_->moving.begin() + rods_.begin, work_->moving.begin() + rods_.end,
+                      [](char moving) { return moving; });
 }
 
 PetscErrorCode NewtonSolver::assemble(Mat) {
@@ -260,9 +274,12 @@ PetscErrorCode NewtonSolver::refill() {
     for (int r = rods_.begin; r < rods_.end; ++r) {
       const RodRange &rod = potential_->elements().rods[r];
       for (int a = 0; a < slot_size && work_->shift[r] != 0; ++a) {
-        double *own = blocks.entry(rod, EdgeBlocks::own(a, a)), *vertex = a < 3 ? blocks.entry(rod, EdgeBlocks::vertex(a, a)) : nullptr;
+        double *own = blocks.entry(rod, EdgeBlocks::own(a, a)),
+               *vertex = a < 3 ? blocks.entry(rod, EdgeBlocks::vertex(a, a)) : nullptr;
         for (int i = 0; i < rod.edges; ++i)
-          own[i] += work_->shift[r] * (a == 3 ? work_->metric[3][rod.slot(i)] : system_.edge_metric ? system_.edge_metric[rod.slot(i)] : 0);
+          own[i] += work_->shift[r] * (a == 3                ? work_->metric[3][rod.slot(i)]
+                                       : system_.edge_metric ? system_.edge_metric[rod.slot(i)]
+                                                             : 0);
         for (int i = 0; i < rod.vertices && vertex; ++i) vertex[i] += work_->shift[r] * work_->metric[a][rod.slot(i)];
       }
     }
@@ -275,7 +292,8 @@ PetscErrorCode NewtonSolver::refill() {
 PetscErrorCode NewtonSolver::refactor() {
   PetscFunctionBeginUser;
   PetscCall(refill());
-  Mat matrix = inertia_.object() ? band_.object() : jacobian_.object(); // set anew, or KSP takes it for the one it knows
+  Mat matrix =
+      inertia_.object() ? band_.object() : jacobian_.object(); // set anew, or KSP takes it for the one it knows
   PetscCall(KSPSetOperators(factored(), matrix, matrix));
   PetscCall(KSPSetUp(factored()));
   PetscFunctionReturn(0);
@@ -331,7 +349,8 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
   PetscFunctionReturn(0);
 }
 
-/// Negative pivots of the factored matrix, per rod where the factorisation tells; `regular` is false when it broke down.
+/// Negative pivots of the factored matrix, per rod where the factorisation tells; `regular` is false when it broke
+/// down.
 PetscErrorCode NewtonSolver::readInertia(bool *regular) {
   PC pc;
   Mat factor;
@@ -369,7 +388,8 @@ PetscErrorCode NewtonSolver::includeMotion(Vec y) {
   const Planes &gradient = potential_->derivatives(rods_).gradient;
   for (int r = rods_.begin; r < rods_.end; ++r) {
     const RodRange &rod = dofs.rods()[r];
-    for (int a = 0; a < slot_size; ++a) std::copy(gradient[a] + rod.first_slot, gradient[a] + rod.vertexEnd() + 2, right[a] + rod.first_slot);
+    for (int a = 0; a < slot_size; ++a)
+      std::copy(gradient[a] + rod.first_slot, gradient[a] + rod.vertexEnd() + 2, right[a] + rod.first_slot);
     potential_->blocks().multiply(rod, work_->motion, right);
     dofs.fold(rod, right);
   }
@@ -382,7 +402,8 @@ PetscErrorCode NewtonSolver::includeMotion(Vec y) {
 /// Newton direction of the whole derivative, couples included, from that of its symmetric part, in work_->increment.
 PetscErrorCode NewtonSolver::includeCirculation(bool *regular) {
   PetscFunctionBeginUser;
-  PetscCall(circulatory_->update([this](const Planes &right, Planes &solution) { return solveLinear(right, solution); }));
+  PetscCall(
+      circulatory_->update([this](const Planes &right, Planes &solution) { return solveLinear(right, solution); }));
   *regular = circulatory_->correct(work_->increment);
   PetscFunctionReturn(0);
 }
@@ -403,11 +424,15 @@ bool NewtonSolver::residualFalls(int r, double length, const IncrementalPotentia
   potential_->gradient(r);
   const IncrementalPotential::Residual now = potential_->residual(r, trial), before = work_->residual[r];
   potential_->accept(kept, r);
-  auto size = [](const IncrementalPotential::Residual &residual) { return std::hypot(residual.force, residual.moment); };
-  return now.isFinite() && (size(now) <= (1 - sufficient * length) * size(before) || excess(now, rtol_) <= 1 || isAtNoise(now, rtol_));
+  auto size = [](const IncrementalPotential::Residual &residual) {
+    return std::hypot(residual.force, residual.moment);
+  };
+  return now.isFinite() &&
+         (size(now) <= (1 - sufficient * length) * size(before) || excess(now, rtol_) <= 1 || isAtNoise(now, rtol_));
 }
 
-/// The direction of the Hessian factored last, corrected by the secants since (two-loop recursion, Nocedal and Wright 2006, algorithm 7.4), rod by rod.
+/// The direction of the Hessian factored last, corrected by the secants since (two-loop recursion, Nocedal and Wright
+/// 2006, algorithm 7.4), rod by rod.
 PetscErrorCode NewtonSolver::secantDirection(Vec f, Vec y) {
   PetscFunctionBeginUser;
   const DofMap &dofs = potential_->dofs();
@@ -460,7 +485,8 @@ PetscErrorCode NewtonSolver::addSecant(const std::vector<double> &before, Vec f)
   PetscCall(VecRestoreArrayRead(f, &values));
   for (std::size_t i = 0; i < before.size(); ++i) secant.change[i] -= before[i];
   for (int r = rods_.begin; r < rods_.end; ++r) {
-    const PetscInt begin = dofs.firstUnknown({r, r + 1}) - dofs.firstUnknown(rods_), end = begin + dofs.unknowns({r, r + 1});
+    const PetscInt begin = dofs.firstUnknown({r, r + 1}) - dofs.firstUnknown(rods_),
+                   end = begin + dofs.unknowns({r, r + 1});
     const double length = lengths_[r - rods_.begin];
     double product = 0, steps = 0, changes = 0;
     for (PetscInt i = begin; i < end; ++i) {
@@ -499,12 +525,14 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
     const bool possible = potential_->tryMove(work_->increment, length, r, work_->trial);
     (void)PetscLogEventEnd(events().configuration, 0, 0, 0, 0);
     (void)PetscLogEventBegin(events().energy, 0, 0, 0, 0);
-    const IncrementalPotential::RodEnergy energy = possible ? potential_->rodEnergy(work_->trial, r) : IncrementalPotential::RodEnergy{};
+    const IncrementalPotential::RodEnergy energy =
+        possible ? potential_->rodEnergy(work_->trial, r) : IncrementalPotential::RodEnergy{};
     (void)PetscLogEventEnd(events().energy, 0, 0, 0, 0);
     return energy;
   };
   // Where the symmetric part is indefinite, couples have nothing that an equilibrium would minimise.
-  const bool free = seek_ == Seek::equilibrium || (potential_->step().isStatic() && circulatory_ && circulatory_->acts(r) && work_->negative[r] > 0);
+  const bool free = seek_ == Seek::equilibrium ||
+                    (potential_->step().isStatic() && circulatory_ && circulatory_->acts(r) && work_->negative[r] > 0);
   const LineSearchKind kind = potential_->settings.line_search;
   enum class Length { good, too_long, too_short };
   auto judge = [&](double length) {
@@ -535,7 +563,8 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
     }
     // Minimum of the parabola through both energies and the slope, kept within a fifth and a half.
     const double curvature = after.value - before.value - *lambda * slope;
-    const double best = std::isfinite(after.value) && curvature > 0 ? -slope * *lambda * *lambda / (2 * curvature) : 0.5 * *lambda;
+    const double best =
+        std::isfinite(after.value) && curvature > 0 ? -slope * *lambda * *lambda / (2 * curvature) : 0.5 * *lambda;
     *lambda = std::clamp(best, 0.2 * *lambda, 0.5 * *lambda);
   }
   if (!accepted) {
@@ -553,9 +582,11 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
   }
   standstill.tiny = work_->indefinite[r] && *lambda >= 1 && sizeOf(r, work_->increment) < 1e-3;
   if (*lambda < 0.1) work_->last_shift[r] *= 16; // a shift that leaves too long a step is too small
-  // A full step that gained clearly more than a quadratic would: the minimum lies beyond, as on the way down from a barrier.
+  // A full step that gained clearly more than a quadratic would: the minimum lies beyond, as on the way down from a
+  // barrier.
   const double gain = (after.value - before.value) / slope;
-  if (kind == LineSearchKind::energy && !free && *lambda == 1 && gain > 0.6 && gain < 1 && -slope > 1e3 * before.noise) {
+  if (kind == LineSearchKind::energy && !free && *lambda == 1 && gain > 0.6 && gain < 1 &&
+      -slope > 1e3 * before.noise) {
     const double longer = std::min(2.0, 0.5 / (1 - gain));
     const IncrementalPotential::RodEnergy beyond = attempt(longer);
     if (beyond.value < after.value) {
@@ -600,7 +631,8 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   fill(work_->indefinite, false);
   if (fresh_ && seek_ == Seek::minimum) PetscCall(findIndefinite(y, regular, &indefinite));
   if (indefinite) PetscCall(makeDescent(f, y, regular));
-  if (std::any_of(work_->moving.begin() + rods_.begin, work_->moving.begin() + rods_.end, [](char m) { return m; })) PetscCall(includeMotion(y));
+  if (std::any_of(work_->moving.begin() + rods_.begin, work_->moving.begin() + rods_.end, [](char m) { return m; }))
+    PetscCall(includeMotion(y));
   PetscCall(potential_->dofs().scatter(y, rods_, work_->increment));
   if (circulatory_) PetscCall(includeCirculation(&regular));
 
@@ -646,7 +678,8 @@ PetscErrorCode NewtonSolver::inertiaAtIterate(int *negative, double lift) {
   fill(work_->wanted, true);
   age_ = 0;
   PetscCall(assemble(jacobian_));
-  for (int r = rods_.begin; r < rods_.end && potential_->step().hessian != HessianKind::exact; ++r) potential_->assembleRod(r, HessianKind::exact);
+  for (int r = rods_.begin; r < rods_.end && potential_->step().hessian != HessianKind::exact; ++r)
+    potential_->assembleRod(r, HessianKind::exact);
   for (int r = rods_.begin; r < rods_.end; ++r) work_->shift[r] = lift * firstShift(r);
   PetscCall(refactor());
   PetscCall(readInertia(&regular));
@@ -662,7 +695,8 @@ void NewtonSolver::focus() {
 /// The rod that is farthest from its equilibrium, in words.
 std::string NewtonSolver::farthest() {
   const int rod = farthestRod(*potential_, rods_, asked(), &work_->wanted);
-  if (rod >= 0 && isAtNoise(potential_->residual(rod, energyAtIterate(rod)), 0)) return "; " + roundingMessage(rod, sizeOf(rod, work_->increment));
+  if (rod >= 0 && isAtNoise(potential_->residual(rod, energyAtIterate(rod)), 0))
+    return "; " + roundingMessage(rod, sizeOf(rod, work_->increment));
   return tellImbalance(*potential_, rod, asked());
 }
 
@@ -671,8 +705,8 @@ std::string NewtonSolver::unstableRod() const {
   if (!banded_ && !inertia_ && rods_.end - rods_.begin > 1) return "";
   for (int r = rods_.begin; r < rods_.end; ++r)
     if (const int count = work_->negative[r]; count > 0)
-      return "; " + labelOf(potential_->scene().rods[r]) + ": forces and moments are in balance, and " + std::to_string(count) +
-             (count == 1 ? " motion lowers" : " motions lower") + " its energy";
+      return "; " + labelOf(potential_->scene().rods[r]) + ": forces and moments are in balance, and " +
+             std::to_string(count) + (count == 1 ? " motion lowers" : " motions lower") + " its energy";
   return "";
 }
 
@@ -689,8 +723,11 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
   age_ = 0;
   lost_.clear();
   PetscCall(writeIterate(x_));
-  // From a saddle the way down may be long, and shorter load steps begin at the same one; of fine rods they are still the cheaper way.
-  int limits = report_.escapes > 0 && patience_ == 0 && potential_->elements().edges() <= most_searched_edges ? limits_from_saddle : 1;
+  // From a saddle the way down may be long, and shorter load steps begin at the same one; of fine rods they are still
+  // the cheaper way.
+  int limits = report_.escapes > 0 && patience_ == 0 && potential_->elements().edges() <= most_searched_edges
+                   ? limits_from_saddle
+                   : 1;
   do {
     spent_ = report_.iterations;
     PetscCall(SNESSolve(snes_, nullptr, x_));
@@ -739,23 +776,29 @@ std::string NewtonSolver::nearBarrier() const {
     forCells(e, r, [&]<class T>(const LooseCell &cell, int count) {
       for (int l = 0; l < count; ++l) {
         if (e.measure[r] == Measure::tan) twist.include(std::abs(c[Configuration::twist][cell.slot + l]), r);
-        turning.include(std::acos(std::clamp(c.frameAt(cell.frame0 + l).tangent.dot(c.frameAt(cell.frame1 + l).tangent), -1.0, 1.0)), r);
+        turning.include(std::acos(std::clamp(c.frameAt(cell.frame0 + l).tangent.dot(c.frameAt(cell.frame1 + l).tangent),
+                                             -1.0, 1.0)),
+                        r);
       }
     });
   constexpr double near = 150, degrees = 180 / pi;
   std::string hint;
-  auto told = [&](const Worst &worst) { return "; neighbouring edges of " + labelOf(potential_->scene().rods[worst.rod]) + " are "; };
+  auto told = [&](const Worst &worst) {
+    return "; neighbouring edges of " + labelOf(potential_->scene().rods[worst.rod]) + " are ";
+  };
   if (twist.angle * degrees > near)
     hint += told(twist) + "twisted by " + std::to_string(int(twist.angle * degrees)) +
             " degrees, and measure tan has a barrier at 180: use more edges, or measure: angle";
   if (turning.angle * degrees > near)
-    hint += told(turning) + "folded by " + std::to_string(int(turning.angle * degrees)) + " degrees of at most 180: use more edges";
+    hint += told(turning) + "folded by " + std::to_string(int(turning.angle * degrees)) +
+            " degrees of at most 180: use more edges";
   return hint;
 }
 
-/// Words on the rod of the energy `seed` that bends most sharply, more than `sharpest`, with its edges shorter than `longest`: without axial force its
-/// stretch r obeys r^2 = 1 - 2 B kappa^2/EA, with kappa the turning per reference length, and the moment B r^2 kappa is largest where B kappa^2 = EA/6,
-/// the unit of the sharpness, and r^2 = 2/3. Empty where none does.
+/// Words on the rod of the energy `seed` that bends most sharply, more than `sharpest`, with its edges shorter than
+/// `longest`: without axial force its stretch r obeys r^2 = 1 - 2 B kappa^2/EA, with kappa the turning per reference
+/// length, and the moment B r^2 kappa is largest where B kappa^2 = EA/6, the unit of the sharpness, and r^2 = 2/3.
+/// Empty where none does.
 std::string NewtonSolver::sharpestBend(const Configuration &c, double sharpest, double longest) const {
   const Elements &e = potential_->elements();
   constexpr double near = 0.88; // of the limit; where it is passed the moment falls again
@@ -769,25 +812,31 @@ std::string NewtonSolver::sharpestBend(const Configuration &c, double sharpest, 
         const CellOf<double> k = cellOf<double>(e.cells(), c, cell.slot);
         const double stretch = cellGeometry(c.frameAt(cell.frame0), c.frameAt(cell.frame1), k).stretch;
         const std::array<double, 3> s = presentStrain<double>(e, c, r, cell);
-        const Eigen::Vector2d strain(s[0] - k.rest[0], s[1] - k.rest[1]), force(k.stiffness[0] * strain[0], k.stiffness[1] * strain[1]);
-        const double bending = force.squaredNorm() / force.dot(strain) * e.cellLength()[cell.slot]; // B about the axis of bending
+        const Eigen::Vector2d strain(s[0] - k.rest[0], s[1] - k.rest[1]),
+            force(k.stiffness[0] * strain[0], k.stiffness[1] * strain[1]);
+        const double bending =
+            force.squaredNorm() / force.dot(strain) * e.cellLength()[cell.slot]; // B about the axis of bending
         const double sharpness = 6 * force.squaredNorm() / (bending * stretch * stretch * rod.material.axial_stiffness);
         if (!(sharpness > sharpest && stretch < longest)) continue;
         sharpest = sharpness;
-        const double moment = stretch * force.norm(), limit = 2.0 / 3 * std::sqrt(rod.material.axial_stiffness * bending / 6);
+        const double moment = stretch * force.norm(),
+                     limit = 2.0 / 3 * std::sqrt(rod.material.axial_stiffness * bending / 6);
         hint.str("");
         hint << std::setprecision(4) << "; rod '" << rod.name
-             << (moment > near * limit ? "' bends under a moment of " : "' has given way to bending, its moment is down to ") << moment
-             << " N m, and its 'energy: seed', which couples bending with stretch, bears at most (2/3) sqrt(EA EI/6) = " << limit
-             << " N m without tension; 'energy: classical' has no limit";
+             << (moment > near * limit ? "' bends under a moment of "
+                                       : "' has given way to bending, its moment is down to ")
+             << moment
+             << " N m, and its 'energy: seed', which couples bending with stretch, bears at most (2/3) sqrt(EA EI/6) = "
+             << limit << " N m without tension; 'energy: classical' has no limit";
       }
     });
   }
   return hint.str();
 }
 
-/// Words on a rod of the energy `seed` that is near a limit of its law, or beyond: of bending, as sharpestBend, or of compression with an edge shorter than
-/// `shortest`; the force is largest, EA r (1 - r^2)/2 = 0.192 EA, where the stretch r obeys r^2 = 1/3.
+/// Words on a rod of the energy `seed` that is near a limit of its law, or beyond: of bending, as sharpestBend, or of
+/// compression with an edge shorter than `shortest`; the force is largest, EA r (1 - r^2)/2 = 0.192 EA, where the
+/// stretch r obeys r^2 = 1/3.
 std::string NewtonSolver::limitOfLaw(const Configuration &c, double sharpest, double longest, double shortest) const {
   std::string bent = sharpestBend(c, sharpest, longest);
   if (!bent.empty()) return bent;
@@ -796,10 +845,12 @@ std::string NewtonSolver::limitOfLaw(const Configuration &c, double sharpest, do
   for (int r = rods_.begin; r < rods_.end; ++r) {
     const Rod &rod = potential_->scene().rods[r];
     double stretch = shortest;
-    for (int s = e.rods[r].first_slot; s < e.rods[r].edgeEnd(); ++s) stretch = std::min(stretch, c[Configuration::length][s] * e.inverseRestLength()[s]);
+    for (int s = e.rods[r].first_slot; s < e.rods[r].edgeEnd(); ++s)
+      stretch = std::min(stretch, c[Configuration::length][s] * e.inverseRestLength()[s]);
     if (rod.energy != Energy::seed || stretch == shortest) continue;
     words << std::setprecision(4) << "; an edge of rod '" << rod.name << "' is down to " << stretch
-          << " of its length, and its 'energy: seed' bears at most 0.192 EA = " << rod.material.axial_stiffness / (3 * std::sqrt(3.0))
+          << " of its length, and its 'energy: seed' bears at most 0.192 EA = "
+          << rod.material.axial_stiffness / (3 * std::sqrt(3.0))
           << " N of compression; 'energy: classical' has no limit";
     break;
   }
@@ -812,13 +863,19 @@ void NewtonSolver::predict(const State &start) {
   const double *freedom = potential_->elements().freedom();
   const StageRule *rule = potential_->step().rule;
   const Combination guess = rule ? rule->guess : Combination().add(potential_->step().dt, start);
-  // Backward Euler's velocities are the last step's chords; others are tangents of the motion, and say nothing of lengths at that accuracy.
-  const RetractionKind along = rule && rule->half ? RetractionKind::additive : rule ? RetractionKind::kept : RetractionKind::continued;
-  const RetractionKind kind = potential_->settings.retraction == RetractionKind::length ? along : potential_->settings.retraction;
+  // Backward Euler's velocities are the last step's chords; others are tangents of the motion, and say nothing of
+  // lengths at that accuracy.
+  const RetractionKind along = rule && rule->half ? RetractionKind::additive
+                               : rule             ? RetractionKind::kept
+                                                  : RetractionKind::continued;
+  const RetractionKind kind =
+      potential_->settings.retraction == RetractionKind::length ? along : potential_->settings.retraction;
   for (int r = rods_.begin; r < rods_.end; ++r) {
     const RodRange &rod = dofs.rods()[r];
-    for (int i = 0; i < rod.vertices; ++i) work_->increment.setVector(0, rod.slot(i), freedom[rod.slot(i)] * guess.atVertex(rod.first_vertex + i));
-    for (int i = 0; i < rod.edges; ++i) work_->increment[3][rod.slot(i)] = rod.twist ? guess.atEdge(rod.first_edge + i) : 0;
+    for (int i = 0; i < rod.vertices; ++i)
+      work_->increment.setVector(0, rod.slot(i), freedom[rod.slot(i)] * guess.atVertex(rod.first_vertex + i));
+    for (int i = 0; i < rod.edges; ++i)
+      work_->increment[3][rod.slot(i)] = rod.twist ? guess.atEdge(rod.first_edge + i) : 0;
     dofs.copyBehindRing(rod, work_->increment);
     if (!potential_->tryMove(work_->increment, 1, r, kind, work_->trial)) continue;
     const IncrementalPotential::RodEnergy energy = potential_->rodEnergy(work_->trial, r);
@@ -830,13 +887,15 @@ void NewtonSolver::predict(const State &start) {
   }
 }
 
-PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, Seek seek, const Guess *guess, int patience) {
+PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, Seek seek, const Guess *guess,
+                                   int patience) {
   constexpr int most_rounds = 4; // of a tolerance made sharper
   std::string failure;
   const bool is_static = potential_->step().isStatic();
   PetscFunctionBeginUser;
   focus();
-  system_.edge_metric = is_static ? work_->edge_metric.data() : nullptr; // in dynamics, inertia is what holds short waves
+  system_.edge_metric =
+      is_static ? work_->edge_metric.data() : nullptr; // in dynamics, inertia is what holds short waves
   report_ = {};
   seek_ = seek;
   follows_ = seek == Seek::equilibrium;
@@ -857,7 +916,8 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
   } else if (!is_static)
     predict(start);
   if (potential_->beyondBarrier())
-    failure = "a support turns past the barrier of measure tan at 180 degrees of twist per vertex; use more edges, or measure: angle";
+    failure = "a support turns past the barrier of measure tan at 180 degrees of twist per vertex; use more edges, or "
+              "measure: angle";
   else
     PetscCall(newton(&failure));
   // In statics the answer must be a minimum, and the Hessian there says how far from it the iterate still is.
@@ -885,7 +945,9 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
     report_.negative_pivots = negative;
     if (k == 0) report_.first_negative_pivots = negative;
     if (seek == Seek::equilibrium && negative >= 0) break;
-    if (negative > 0) beyond = limitOfLaw(potential_->iterate(), 1, std::sqrt(2.0 / 3), std::sqrt(1.0 / 3)); // where an edge gives way, the load falls
+    if (negative > 0)
+      beyond = limitOfLaw(potential_->iterate(), 1, std::sqrt(2.0 / 3),
+                          std::sqrt(1.0 / 3)); // where an edge gives way, the load falls
     if (!beyond.empty()) {
       failure = "the equilibrium is unstable" + beyond;
       break;
@@ -907,19 +969,22 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
     }
     seek_ = seek;
     if (!left) {
-      failure = negative < 0 ? "the Hessian cannot be factored" + tellImbalance(*potential_, farthestRod(*potential_, rods_, asked()), asked())
-                             : "the equilibrium is unstable (negative pivots) and no way down from it was found" + unstable;
+      failure = negative < 0
+                    ? "the Hessian cannot be factored" +
+                          tellImbalance(*potential_, farthestRod(*potential_, rods_, asked()), asked())
+                    : "the equilibrium is unstable (negative pivots) and no way down from it was found" + unstable;
       break;
     }
     sharpness_ *= 1e-2; // close to a branching the forces are small far from the equilibrium
     PetscCall(newton(&failure));
   }
   report_.converged = failure.empty();
-  for (int r = rods_.begin; r < rods_.end; ++r) report_.rounding_error = std::max(report_.rounding_error, work_->left[r]);
-  report_.reason =
-      report_.converged
-          ? "converged"
-          : failure + nearBarrier() + (beyond.empty() ? limitOfLaw(potential_->start(), 0.5, HUGE_VAL, 0.65) : ""); // 0.88 of the moment, 0.98 of the force
+  for (int r = rods_.begin; r < rods_.end; ++r)
+    report_.rounding_error = std::max(report_.rounding_error, work_->left[r]);
+  report_.reason = report_.converged ? "converged"
+                                     : failure + nearBarrier() +
+                                           (beyond.empty() ? limitOfLaw(potential_->start(), 0.5, HUGE_VAL, 0.65)
+                                                           : ""); // 0.88 of the moment, 0.98 of the force
   *report = report_;
   PetscFunctionReturn(0);
 }

@@ -9,8 +9,8 @@
 
 namespace tendril {
 
-/// Rods whose Hessian gives no way down as it is: with negative pivots, or with zero ones where forces act on the motions that they leave out. `y`:
-/// Newton's direction.
+/// Rods whose Hessian gives no way down as it is: with negative pivots, or with zero ones where forces act on the
+/// motions that they leave out. `y`: Newton's direction.
 PetscErrorCode NewtonSolver::findIndefinite(Vec y, bool regular, bool *any) {
   constexpr double little = 1e-3; // of the forces
   PetscFunctionBeginUser;
@@ -43,9 +43,10 @@ PetscErrorCode NewtonSolver::findIndefinite(Vec y, bool regular, bool *any) {
   PetscFunctionReturn(0);
 }
 
-/// Direction for an indefinite Hessian. A few negative pivots mean a state near a branching: a shifted diagonal keeps most of Newton's speed there.
-/// Many mean compressed edges: then their compression is left out of the Hessian, and the diagonal shifted only if that is not enough.
-/// In statics an equilibrium of couples need not be a minimum of anything: there Newton's own direction stands.
+/// Direction for an indefinite Hessian. A few negative pivots mean a state near a branching: a shifted diagonal keeps
+/// most of Newton's speed there. Many mean compressed edges: then their compression is left out of the Hessian, and the
+/// diagonal shifted only if that is not enough. In statics an equilibrium of couples need not be a minimum of anything:
+/// there Newton's own direction stands.
 PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
   constexpr int few = 4;          // the two planes of the first two buckling modes
   constexpr double longest = 0.1; // of the rod's length
@@ -55,10 +56,12 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
     PetscFunctionReturn(0);
   }
   const int unshifted = report_.negative_pivots;
-  const HessianKind kind = potential_->step().hessian == HessianKind::exact ? HessianKind::uncompressed : potential_->step().hessian;
+  const HessianKind kind =
+      potential_->step().hessian == HessianKind::exact ? HessianKind::uncompressed : potential_->step().hessian;
   bool compressed = false;
   for (int r = rods_.begin; r < rods_.end; ++r) {
-    if (!work_->wanted[r] || work_->negative[r] <= (banded_ || inertia_ ? few : few * (rods_.end - rods_.begin))) continue;
+    if (!work_->wanted[r] || work_->negative[r] <= (banded_ || inertia_ ? few : few * (rods_.end - rods_.begin)))
+      continue;
     potential_->assembleRod(r, kind);
     compressed = true;
   }
@@ -69,12 +72,14 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
   }
   PetscCall(shiftUntilPositive(regular));
   PetscCall(KSPSolve(factored(), f, y));
-  // A direction far longer than the rod comes of motions almost without stiffness: a larger shift, instead of a line search that cuts all of it.
+  // A direction far longer than the rod comes of motions almost without stiffness: a larger shift, instead of a line
+  // search that cuts all of it.
   for (bool longer = potential_->step().isStatic(); longer;) {
     longer = false;
     PetscCall(potential_->dofs().scatter(y, rods_, work_->increment));
     for (int r = rods_.begin; r < rods_.end; ++r)
-      if (work_->wanted[r] && work_->shift[r] > 0 && work_->edge_metric[potential_->elements().rods[r].first_slot] > 0) { // what hangs on one place swings
+      if (work_->wanted[r] && work_->shift[r] > 0 &&
+          work_->edge_metric[potential_->elements().rods[r].first_slot] > 0) { // what hangs on one place swings
         const double size = sizeOf(r, work_->increment);
         if (!(size > longest)) continue;
         work_->last_shift[r] = work_->shift[r] *= std::min(size / longest, 1e6);
@@ -89,7 +94,8 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
   PetscFunctionReturn(0);
 }
 
-/// First shift to try [1/s^2]: the slowest bending wave of the rod where it is fastest, EI/(rho L^4), or the edge's own axial one for a cable.
+/// First shift to try [1/s^2]: the slowest bending wave of the rod where it is fastest, EI/(rho L^4), or the edge's own
+/// axial one for a cable.
 double NewtonSolver::firstShift(int r) const {
   const Rod &rod = potential_->scene().rods[r];
   const double length = potential_->length(r);
@@ -100,8 +106,9 @@ double NewtonSolver::firstShift(int r) const {
   return stiffness / (m.linear_density * length * length);
 }
 
-/// Adds multiples of the metric to the indefinite Hessians until all pivots are positive, so that the step goes downhill. Starts near
-/// the last shift that was needed, so that a run of indefinite iterates costs one extra factorisation each.
+/// Adds multiples of the metric to the indefinite Hessians until all pivots are positive, so that the step goes
+/// downhill. Starts near the last shift that was needed, so that a run of indefinite iterates costs one extra
+/// factorisation each.
 PetscErrorCode NewtonSolver::shiftUntilPositive(bool regular) {
   PetscFunctionBeginUser;
   for (int attempt = 0; attempt < 40; ++attempt) {
@@ -121,8 +128,9 @@ PetscErrorCode NewtonSolver::shiftUntilPositive(bool regular) {
   PetscFunctionReturn(0);
 }
 
-/// One of two fixed starts without symmetry for the search of a mode, in work_->increment: the same on every machine. Of two modes in different planes that
-/// are alike, as those of a round rod, a state may have left along the first start; then it is orthogonal to what is left, and the second is not.
+/// One of two fixed starts without symmetry for the search of a mode, in work_->increment: the same on every machine.
+/// Of two modes in different planes that are alike, as those of a round rod, a state may have left along the first
+/// start; then it is orthogonal to what is left, and the second is not.
 void NewtonSolver::beginMode(int start) {
   constexpr double weight[2][slot_size] = {{1, 1, 1, 1}, {1, -2, 3, -4}};
   const DofMap &dofs = potential_->dofs();
@@ -131,7 +139,8 @@ void NewtonSolver::beginMode(int start) {
     const RodRange &rod = dofs.rods()[r];
     for (int i = 0; i < rod.vertices; ++i)
       for (int a = 0; a < slot_size; ++a)
-        if (dofs.unknown(rod.slot(i), a) >= 0) work_->increment[a][rod.slot(i)] = weight[start][a] * (1 + 0.5 * std::sin(1.7 * (slot_size * i + a)));
+        if (dofs.unknown(rod.slot(i), a) >= 0)
+          work_->increment[a][rod.slot(i)] = weight[start][a] * (1 + 0.5 * std::sin(1.7 * (slot_size * i + a)));
     dofs.copyBehindRing(rod, work_->increment);
   }
 }
@@ -141,7 +150,8 @@ double NewtonSolver::massOf(int r) const {
   const RodRange &rod = potential_->elements().rods[r];
   double mass = 0;
   for (int a = 0; a < slot_size; ++a)
-    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) mass += work_->metric[a][s] * work_->increment[a][s] * work_->increment[a][s];
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
+      mass += work_->metric[a][s] * work_->increment[a][s] * work_->increment[a][s];
   return mass;
 }
 
@@ -158,16 +168,20 @@ double NewtonSolver::turningOf(int r) const {
   const Elements &e = potential_->elements();
   double turning = 0;
   for (int s = e.rods[r].first_slot; s < e.rods[r].edgeEnd(); ++s) {
-    for (int a = 0; a < 3; ++a) turning = std::max(turning, std::abs(work_->increment[a][s + 1] - work_->increment[a][s]) * e.inverseRestLength()[s]);
+    for (int a = 0; a < 3; ++a)
+      turning =
+          std::max(turning, std::abs(work_->increment[a][s + 1] - work_->increment[a][s]) * e.inverseRestLength()[s]);
     turning = std::max(turning, std::abs(work_->increment[3][s]));
   }
   return turning;
 }
 
-/// Bisection of the lift on the inertia, then inverse iteration beside the eigenvalue found: motions that cost nothing have another one, if only by little.
+/// Bisection of the lift on the inertia, then inverse iteration beside the eigenvalue found: motions that cost nothing
+/// have another one, if only by little.
 PetscErrorCode NewtonSolver::criticalMode(int stable, double *lift, Planes *mode) {
   constexpr int iterations = 12;
-  constexpr double close = 1.01, highest = 1e12; // ratio of the ends of the interval: each iteration gains a factor of 100
+  constexpr double close = 1.01,
+                   highest = 1e12; // ratio of the ends of the interval: each iteration gains a factor of 100
   PetscFunctionBeginUser;
   int negative;
   double low = *lift, high = low;
@@ -192,7 +206,8 @@ PetscErrorCode NewtonSolver::criticalMode(int stable, double *lift, Planes *mode
     for (int r = rods_.begin; r < rods_.end; ++r) {
       const RodRange &rod = potential_->elements().rods[r];
       for (int a = 0; a < slot_size; ++a)
-        for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) right[a][s] = work_->metric[a][s] * work_->increment[a][s];
+        for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
+          right[a][s] = work_->metric[a][s] * work_->increment[a][s];
     }
     PetscCall(solveLinear(right, work_->increment));
     normaliseMode();
@@ -223,8 +238,9 @@ struct Probe {
   Planes motion, stiff, soft;
 };
 
-/// The combination of up to three probes with the largest quotient of v'(A - K)v and v'Av, rod by rod: a step of locally optimal conjugate gradients (Knyazev
-/// 2001) from `x` along `w`, and what the last step moved by, `p`. `x` has v'Av = 1 then.
+/// The combination of up to three probes with the largest quotient of v'(A - K)v and v'Av, rod by rod: a step of
+/// locally optimal conjugate gradients (Knyazev 2001) from `x` along `w`, and what the last step moved by, `p`. `x` has
+/// v'Av = 1 then.
 void improve(const RodRange &rod, const Probe &w, Probe &x, Probe &p, int count) {
   const std::array<const Probe *, 3> basis{&w, &x, &p};
   Eigen::MatrixXd stiff(3, 3), soft(3, 3);
@@ -234,7 +250,8 @@ void improve(const RodRange &rod, const Probe &w, Probe &x, Probe &p, int count)
       soft(i, j) = soft(j, i) = dot(rod, basis[i]->motion, basis[j]->soft);
     }
   Eigen::Vector3d share = Eigen::Vector3d::Zero();
-  for (bool independent = false; count > 0 && !independent; --count) { // what is almost a combination of the others is left out
+  for (bool independent = false; count > 0 && !independent;
+       --count) { // what is almost a combination of the others is left out
     const Eigen::VectorXd scale = stiff.diagonal().head(count).cwiseSqrt().cwiseInverse();
     const Eigen::MatrixXd a = scale.asDiagonal() * stiff.topLeftCorner(count, count) * scale.asDiagonal();
     independent = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(a).eigenvalues()[0] > 1e-10;
@@ -258,12 +275,15 @@ void improve(const RodRange &rod, const Probe &w, Probe &x, Probe &p, int count)
 
 } // namespace
 
-/// Directions of negative curvature of the rods with negative pivots, in work_->increment. With the Hessian K = E - G split into the part E without
-/// compression and the effect G of compression, the largest eigenvalue of E^-1 G belongs to the first buckling mode, the smoothest way out. Where
-/// compression is not the cause, or leaves motions without stiffness, the shifted Hessian in place of E gives the lowest mode, beginning from the last shift.
-/// `neutral`: rods whose mode costs no energy, to rounding, and that nothing goes down from: a turn of the whole rod about an axis, say.
+/// Directions of negative curvature of the rods with negative pivots, in work_->increment. With the Hessian K = E - G
+/// split into the part E without compression and the effect G of compression, the largest eigenvalue of E^-1 G belongs
+/// to the first buckling mode, the smoothest way out. Where compression is not the cause, or leaves motions without
+/// stiffness, the shifted Hessian in place of E gives the lowest mode, beginning from the last shift. `neutral`: rods
+/// whose mode costs no energy, to rounding, and that nothing goes down from: a turn of the whole rod about an axis,
+/// say.
 PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::vector<char> *neutral) {
-  // Of the energies that balance, stiff edges leave 1e-7 by rounding; and what the forces are out of balance by, a neutral motion is curved by.
+  // Of the energies that balance, stiff edges leave 1e-7 by rounding; and what the forces are out of balance by, a
+  // neutral motion is curved by.
   const double rounding = std::clamp(10 * report_.residual.force, 1e-7, 1e-5);
   constexpr int enough = 5; // iterations for a mode that is not close to another
   PetscFunctionBeginUser;
@@ -278,7 +298,8 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
   for (const Try way : {Try::buckling, Try::shifted, Try::shifted_anew}) {
     if (done) break;
     const bool buckling = way == Try::buckling;
-    for (int r = rods_.begin; r < rods_.end; ++r) potential_->assembleRod(r, buckling ? HessianKind::uncompressed : HessianKind::exact);
+    for (int r = rods_.begin; r < rods_.end; ++r)
+      potential_->assembleRod(r, buckling ? HessianKind::uncompressed : HessianKind::exact);
     EdgeBlocks softening = exact;
     if (buckling) {
       PetscCall(refactor());
@@ -292,7 +313,8 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
       PetscCall(shiftUntilPositive(false));
     }
     const bool definite = buckling && report_.zero_pivots == 0;
-    // With A v = b solved, v'K v = v'b - v'(A - K)v: the stiff part of A never enters, whose rounding would hide a small curvature.
+    // With A v = b solved, v'K v = v'b - v'(A - K)v: the stiff part of A never enters, whose rounding would hide a
+    // small curvature.
     auto soften = [&](const Planes &v, Planes &y) { // (A - K) v
       y.clear();
       for (int r = rods_.begin; r < rods_.end; ++r) {
@@ -315,7 +337,9 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
       settled = false;
       for (int k = 0; k < 100 && !settled; ++k) {
         for (int r = rods_.begin; r < rods_.end && k > 0; ++r)
-          if (negative[r] > 0) improve(e.rods[r], w, x, p, start == 0 ? 1 : std::min(k, 3)); // first by inverse iteration, whose modes are smooth
+          if (negative[r] > 0)
+            improve(e.rods[r], w, x, p,
+                    start == 0 ? 1 : std::min(k, 3)); // first by inverse iteration, whose modes are smooth
         watch().beat();
         w.stiff = x.soft;
         PetscCall(solveLinear(w.stiff, w.motion));
@@ -325,10 +349,12 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
         for (int r = rods_.begin; r < rods_.end; ++r) {
           if (negative[r] == 0) continue;
           const double stiffness = dot(e.rods[r], w.motion, w.stiff), softness = dot(e.rods[r], w.motion, w.soft);
-          const double noise = rounding * std::abs(stiffness) + hessianNoise(r, w.motion), change = softness - stiffness - before[r];
+          const double noise = rounding * std::abs(stiffness) + hessianNoise(r, w.motion),
+                       change = softness - stiffness - before[r];
           before[r] = softness - stiffness;
           (*found)[r] = k >= enough && softness - stiffness > noise;
-          // Compression that makes up for no mode's stiffness leaves a definite Hessian: its negative pivots are rounding.
+          // Compression that makes up for no mode's stiffness leaves a definite Hessian: its negative pivots are
+          // rounding.
           (*neutral)[r] = std::abs(softness - stiffness) <= noise || (definite && !(softness > 0.5 * stiffness));
           settled = settled && ((*found)[r] || (k >= enough && std::abs(change) < 1e-3 * noise));
           done = done && (*found)[r];
@@ -338,7 +364,8 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
       }
       for (int r = rods_.begin; r < rods_.end; ++r)
         for (int a = 0; a < slot_size; ++a)
-          std::copy(w.motion[a] + e.rods[r].first_slot, w.motion[a] + e.rods[r].vertexEnd() + 2, work_->increment[a] + e.rods[r].first_slot);
+          std::copy(w.motion[a] + e.rods[r].first_slot, w.motion[a] + e.rods[r].vertexEnd() + 2,
+                    work_->increment[a] + e.rods[r].first_slot);
     }
     done = done || definite || (settled && !buckling);
   }
@@ -346,8 +373,9 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
   PetscFunctionReturn(0);
 }
 
-/// Leaves a saddle along directions of negative curvature; side and length come from trials of growing size, with both retractions:
-/// edges that are just right must keep their lengths, edges that an unstable state holds compressed must be free to grow.
+/// Leaves a saddle along directions of negative curvature; side and length come from trials of growing size, with both
+/// retractions: edges that are just right must keep their lengths, edges that an unstable state holds compressed must
+/// be free to grow.
 PetscErrorCode NewtonSolver::escapeSaddle(bool *left, bool *neutral) {
   PetscFunctionBeginUser;
   *left = false;
@@ -366,7 +394,8 @@ PetscErrorCode NewtonSolver::escapeSaddle(bool *left, bool *neutral) {
     RetractionKind best_kind = RetractionKind::length;
     double best = potential_->rodEnergy(potential_->iterate(), r).value, best_scale = 0;
     for (const RetractionKind kind : {RetractionKind::length, RetractionKind::additive})
-      for (double scale = 1e-6; scale < 2; scale *= 2) // just past a branching of a stiff rod the other branch is that close
+      for (double scale = 1e-6; scale < 2;
+           scale *= 2) // just past a branching of a stiff rod the other branch is that close
         for (const double s : {scale / turning, -scale / turning}) {
           if (!potential_->tryMove(work_->increment, s, r, kind, work_->trial)) continue;
           const double energy = potential_->rodEnergy(work_->trial, r).value;

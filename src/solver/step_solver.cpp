@@ -7,14 +7,16 @@
 namespace tendril {
 namespace {
 
-/// Cuts the scene into blocks of at least so many edges (about 2 kB each), and at least a pack of rods to factor together.
+/// Cuts the scene into blocks of at least so many edges (about 2 kB each), and at least a pack of rods to factor
+/// together.
 std::vector<RodSet> blocksOf(const std::vector<RodRange> &rods) {
   constexpr int block_edges = 800;
   std::vector<RodSet> blocks;
   int begin = 0, edges = 0;
   for (int r = 0; r < int(rods.size()); ++r) {
     edges += rods[r].edges;
-    if ((edges < block_edges || (r + 1 - begin) % lanes != 0) && edges < 4 * block_edges && r + 1 < int(rods.size())) continue;
+    if ((edges < block_edges || (r + 1 - begin) % lanes != 0) && edges < 4 * block_edges && r + 1 < int(rods.size()))
+      continue;
     blocks.push_back({begin, r + 1});
     begin = r + 1;
     edges = 0;
@@ -62,7 +64,8 @@ void StepSolver::begin(const State &start, const Step &step) {
   for (int r = 0; r < potential_->all().end; ++r) potential_->beginRod(start, r);
 }
 
-PetscErrorCode StepSolver::solve(const State &start, const Step &step, NewtonReport *report, Seek seek, const Guess *guess) {
+PetscErrorCode StepSolver::solve(const State &start, const Step &step, NewtonReport *report, Seek seek,
+                                 const Guess *guess) {
   PetscFunctionBeginUser;
   potential_->beginStep(start, step);
   *report = {};
@@ -81,12 +84,14 @@ PetscErrorCode StepSolver::solve(const State &start, const Step &step, NewtonRep
   PetscFunctionReturn(0);
 }
 
-/// Statics. Fine rods that do not converge soon begin again where fewer edges lead; where that leads nowhere, Newton has all the iterations it may take.
+/// Statics. Fine rods that do not converge soon begin again where fewer edges lead; where that leads nowhere, Newton
+/// has all the iterations it may take.
 PetscErrorCode StepSolver::solveBlock(NewtonSolver &block, const State &start, NewtonReport *report) {
   constexpr int patience = 10;
   PetscFunctionBeginUser;
   const std::vector<RodRange> &rods = potential_->elements().rods;
-  const bool fine = std::any_of(rods.begin() + block.rods().begin, rods.begin() + block.rods().end, [](const RodRange &rod) { return rod.edges > fine_edges; });
+  const bool fine = std::any_of(rods.begin() + block.rods().begin, rods.begin() + block.rods().end,
+                                [](const RodRange &rod) { return rod.edges > fine_edges; });
   NewtonReport failed; // what tries took that led nowhere
   bool solved = false;
   auto attempt = [&](const Guess *guess, int most_iterations) {

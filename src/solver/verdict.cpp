@@ -1,6 +1,7 @@
-/// When an iterate is an answer. A residual below its tolerance is one. Rounding may keep the residual above: then the iterate counts when what is left to
-/// the equilibrium, Newton's own correction K^-1 r, is little against what the step, or its loads, move; else the step is lost in rounding. What rounding
-/// leaves of a residual is estimated too, but only to notice early that it does not fall any more.
+/// When an iterate is an answer. A residual below its tolerance is one. Rounding may keep the residual above: then the
+/// iterate counts when what is left to the equilibrium, Newton's own correction K^-1 r, is little against what the
+/// step, or its loads, move; else the step is lost in rounding. What rounding leaves of a residual is estimated too,
+/// but only to notice early that it does not fall any more.
 #include "tendril/solver/newton.hpp"
 
 #include <algorithm>
@@ -17,7 +18,9 @@ constexpr int patience = 3; ///< iterations without a fall of the residual
 
 } // namespace
 
-double excess(const IncrementalPotential::Residual &r, double rtol) { return std::max({r.force, r.moment, r.compatibility / compatibility_rtol}) / rtol; }
+double excess(const IncrementalPotential::Residual &r, double rtol) {
+  return std::max({r.force, r.moment, r.compatibility / compatibility_rtol}) / rtol;
+}
 
 bool isAtNoise(const IncrementalPotential::Residual &r, double rtol) {
   return r.force <= std::max(rtol, r.force_floor) && r.moment <= std::max(rtol, r.moment_floor) &&
@@ -34,7 +37,8 @@ double NewtonSolver::sizeOf(int r, const Planes &increment) const {
   return std::sqrt(positions / (length * length * rod.vertices) + twists / rod.edges);
 }
 
-/// What the step has moved the vertices of a rod by so far, as sizeOf, less the mean of them all: a rod that flies has not moved for that.
+/// What the step has moved the vertices of a rod by so far, as sizeOf, less the mean of them all: a rod that flies has
+/// not moved for that.
 double NewtonSolver::movedBy(int r) const {
   const RodRange &rod = potential_->elements().rods[r];
   Planes &moved = work_->coordinates; // free until the iterate is written
@@ -56,31 +60,37 @@ PetscErrorCode NewtonSolver::findLoadReach() {
   response.setOrigin(loads.equilibrium.origin());
   PetscCall(solveLinear(loads.equilibrium, response));
   for (int r = rods_.begin; r < rods_.end; ++r) {
-    const double reach = sizeOf(r, response), counted = std::min(1.0, reach); // a linear response beyond the length of the rod says nothing
+    const double reach = sizeOf(r, response),
+                 counted = std::min(1.0, reach); // a linear response beyond the length of the rod says nothing
     work_->load_reach[r] = counted;
-    work_->load_energy[r] = reach > 0 ? 0.5 * dot(dofs.rods()[r], loads.equilibrium, response) * std::pow(counted / reach, 2) : 0;
+    work_->load_energy[r] =
+        reach > 0 ? 0.5 * dot(dofs.rods()[r], loads.equilibrium, response) * std::pow(counted / reach, 2) : 0;
   }
   PetscFunctionReturn(0);
 }
 
-/// Whether the last increment of a rod is little: against what the step or its loads move, in displacement and in energy; or against the rounding of the
-/// coordinates, for a rod at rest. `size`: of the increment.
+/// Whether the last increment of a rod is little: against what the step or its loads move, in displacement and in
+/// energy; or against the rounding of the coordinates, for a rod at rest. `size`: of the increment.
 bool NewtonSolver::isLittle(int r, double *size) {
   const double tolerance = potential_->settings.rounding_tolerance;
   const IncrementalPotential::RodEnergy &energy = energyAtIterate(r);
   const double cost = std::abs(work_->standstill[r].energy);
   *size = sizeOf(r, work_->increment);
-  if (*size <= 256 * epsilon * std::max(1.0, energy.reach / potential_->length(r))) return true; // soft turns carry the rounding of many edges
+  if (*size <= 256 * epsilon * std::max(1.0, energy.reach / potential_->length(r)))
+    return true; // soft turns carry the rounding of many edges
   if (*size <= tolerance * movedBy(r) && cost <= tolerance * tolerance * energy.size) return true;
   if (std::isnan(work_->load_reach[r]) && findLoadReach()) return false;
-  return *size <= tolerance * std::max(movedBy(r), work_->load_reach[r]) && cost <= tolerance * tolerance * std::max(energy.size, work_->load_energy[r]);
+  return *size <= tolerance * std::max(movedBy(r), work_->load_reach[r]) &&
+         cost <= tolerance * tolerance * std::max(energy.size, work_->load_energy[r]);
 }
 
 /// What rounding may change v'K v by, with K as it is assembled.
-double NewtonSolver::hessianNoise(int r, const Planes &v) const { return 512 * epsilon * potential_->blocks().magnitude(potential_->elements().rods[r], v); }
+double NewtonSolver::hessianNoise(int r, const Planes &v) const {
+  return 512 * epsilon * potential_->blocks().magnitude(potential_->elements().rods[r], v);
+}
 
-/// Whether the last increment of a rod in statics costs no more energy than the rounding of its Hessian: a turn of a round rod about an axis, say, of which
-/// neither the forces nor the stiffness are known.
+/// Whether the last increment of a rod in statics costs no more energy than the rounding of its Hessian: a turn of a
+/// round rod about an axis, say, of which neither the forces nor the stiffness are known.
 bool NewtonSolver::isNeutral(int r) {
   if (!potential_->step().isStatic()) return false;
   potential_->derivatives({r, r + 1});
@@ -103,7 +113,8 @@ NewtonSolver::Verdict NewtonSolver::judge(int r, double rtol) {
   }
   double size;
   const bool little = isLittle(r, &size);
-  // Far from an answer residuals rise and fall as they like; without the exact Hessian they fall slowly, and corrections say too little.
+  // Far from an answer residuals rise and fall as they like; without the exact Hessian they fall slowly, and
+  // corrections say too little.
   if (!noise && (!little || potential_->step().hessian != HessianKind::exact)) {
     standstill.best = now;
     standstill.iterations = 0;
@@ -118,16 +129,19 @@ NewtonSolver::Verdict NewtonSolver::judge(int r, double rtol) {
     return Verdict::answer;
   }
   if (!stands) return Verdict::going;
-  if (potential_->step().isStatic() && (standstill.partial || isNeutral(r))) return Verdict::answer; // for verify to judge
+  if (potential_->step().isStatic() && (standstill.partial || isNeutral(r)))
+    return Verdict::answer; // for verify to judge
   lost_ = roundingMessage(r, size);
   return Verdict::lost;
 }
 
-/// Whether the residual of a rod is below the tolerance, or at a noise that is little against the loads: what is asked of motions that corrections leave
-/// out.
+/// Whether the residual of a rod is below the tolerance, or at a noise that is little against the loads: what is asked
+/// of motions that corrections leave out.
 bool NewtonSolver::isBalanced(int r, double rtol) const {
   const IncrementalPotential::Residual &residual = work_->residual[r];
-  return excess(residual, rtol) <= 1 || (isAtNoise(residual, rtol) && std::max(residual.force_floor, residual.moment_floor) <= potential_->settings.rounding_tolerance);
+  return excess(residual, rtol) <= 1 ||
+         (isAtNoise(residual, rtol) &&
+          std::max(residual.force_floor, residual.moment_floor) <= potential_->settings.rounding_tolerance);
 }
 
 /// At an equilibrium with its Hessian factored: whether what is left of every rod is little.
@@ -156,22 +170,27 @@ PetscErrorCode NewtonSolver::verify(bool *little) {
 
 std::string NewtonSolver::roundingMessage(int r, double size) const {
   const Rod &rod = potential_->scene().rods[r];
-  const double shortest = potential_->shortestEdge(r), longest = potential_->longestEdge(r), reach = work_->energy[r].reach, length = potential_->length(r);
+  const double shortest = potential_->shortestEdge(r), longest = potential_->longestEdge(r),
+               reach = work_->energy[r].reach, length = potential_->length(r);
   const int edge = int(std::find_if(potential_->elements().restLength() + potential_->elements().rods[r].first_slot,
-                                    potential_->elements().restLength() + potential_->elements().rods[r].edgeEnd(), [&](double l) { return l == shortest; }) -
+                                    potential_->elements().restLength() + potential_->elements().rods[r].edgeEnd(),
+                                    [&](double l) { return l == shortest; }) -
                        (potential_->elements().restLength() + potential_->elements().rods[r].first_slot));
   const auto [k1, k2] = rod.material.flexural_stiffness;
-  const double slenderness = std::min(k1, k2) > 0 ? rod.material.axial_stiffness * length * length / std::min(k1, k2) : 0;
+  const double slenderness =
+      std::min(k1, k2) > 0 ? rod.material.axial_stiffness * length * length / std::min(k1, k2) : 0;
   std::ostringstream text;
   const std::string imbalance = imbalanceOf(*potential_, r, asked());
-  text << std::setprecision(3) << "rod '" << rod.name << "' is lost in rounding: " << imbalance << (imbalance.empty() ? "" : ", and not falling any more; ")
-       << "Newton would still move it by " << size << " of its length, the step moves it by " << movedBy(r) << " (-rounding_tolerance "
+  text << std::setprecision(3) << "rod '" << rod.name << "' is lost in rounding: " << imbalance
+       << (imbalance.empty() ? "" : ", and not falling any more; ") << "Newton would still move it by " << size
+       << " of its length, the step moves it by " << movedBy(r) << " (-rounding_tolerance "
        << potential_->settings.rounding_tolerance << ")";
   if (longest > 100 * shortest)
     text << "; edge " << edge << " is " << shortest << " m long, the longest " << longest
          << " m: take one of its vertices away, or use edges of more even length";
   else if (slenderness > 1e15)
-    text << "; its EA L^2/EI is " << slenderness << ": give it a smaller axial_stiffness, or lay it along an axis of the coordinates";
+    text << "; its EA L^2/EI is " << slenderness
+         << ": give it a smaller axial_stiffness, or lay it along an axis of the coordinates";
   else
     text << "; its " << rod.edges() << " edges are " << shortest << " m long: use fewer edges";
   if (std::max(k1, k2) > 1e12 * std::min(k1, k2) && std::min(k1, k2) > 0)

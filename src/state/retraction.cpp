@@ -5,14 +5,15 @@ namespace {
 
 using C = Configuration;
 
-/// Lanes in which two edges folded by more than a right angle are on the other side of 180 degrees afterwards: their binormal, seen from the
-/// first edge's frame, has turned round.
+/// Lanes in which two edges folded by more than a right angle are on the other side of 180 degrees afterwards: their
+/// binormal, seen from the first edge's frame, has turned round.
 template <class T> auto crossesFold(const std::array<FrameOf<T>, 2> &before, const std::array<FrameOf<T>, 2> &after) {
   auto binormal = [](const std::array<FrameOf<T>, 2> &f) {
     const Vector3<T> b = f[0].tangent.cross(f[1].tangent);
     return std::array<T, 2>{b.dot(f[0].director), b.dot(f[0].secondDirector())};
   };
-  const auto folded = before[0].tangent.dot(before[1].tangent) <= T(0.0) && after[0].tangent.dot(after[1].tangent) <= T(0.0);
+  const auto folded =
+      before[0].tangent.dot(before[1].tangent) <= T(0.0) && after[0].tangent.dot(after[1].tangent) <= T(0.0);
   const std::array<T, 2> b0 = binormal(before), b1 = binormal(after);
   return folded && b0[0] * b1[0] + b0[1] * b1[1] < T(0.0);
 }
@@ -22,7 +23,9 @@ bool anyLane(const Pack::mask_type &m) { return any_of(m); }
 
 } // namespace
 
-Retraction::Retraction(const Elements &elements) : elements_(elements), work_(work_planes, elements.slots) { setInverseTimeSquared(0); }
+Retraction::Retraction(const Elements &elements) : elements_(elements), work_(work_planes, elements.slots) {
+  setInverseTimeSquared(0);
+}
 
 void Retraction::setInverseTimeSquared(double value) {
   if (value == inverse_time_squared_) return;
@@ -32,14 +35,17 @@ void Retraction::setInverseTimeSquared(double value) {
     for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) soft[s] = 0;
     for (int i = 0; i < rod.edges; ++i) // a floor for rods without mass
       for (const int v : {i, (i + 1) % rod.vertices})
-        soft[rod.slot(v)] += 1e-8 * elements_.axialStiffness()[rod.slot(i)] * elements_.inverseRestLength()[rod.slot(i)];
-    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) soft[s] = elements_.freedom()[s] / (soft[s] + elements_.mass()[s] * value);
+        soft[rod.slot(v)] +=
+            1e-8 * elements_.axialStiffness()[rod.slot(i)] * elements_.inverseRestLength()[rod.slot(i)];
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
+      soft[s] = elements_.freedom()[s] / (soft[s] + elements_.mass()[s] * value);
     stiffenNearHeld(rod);
   }
 }
 
-/// Corrections must not kink the rod where a held vertex stands still beside vertices that move: between two held vertices, at distances
-/// a and b, the softness is multiplied by (4ab/(a + b)^2)^2, which leaves position and direction at both as they are.
+/// Corrections must not kink the rod where a held vertex stands still beside vertices that move: between two held
+/// vertices, at distances a and b, the softness is multiplied by (4ab/(a + b)^2)^2, which leaves position and direction
+/// at both as they are.
 void Retraction::stiffenNearHeld(const RodRange &rod) {
   double *soft = work_[softness];
   const double *freedom = elements_.freedom(), *length = elements_.restLength();
@@ -63,7 +69,8 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
   const RodRange &rod = elements_.rods[r];
   for (int a = 0; a < 3; ++a)
     for (int s = rod.first_slot; s < rod.vertexEnd() + (rod.closed ? 2 : 0); s += lanes) {
-      Pack high = read<Pack>(from[C::Plane(C::position + a)] + s), low = read<Pack>(from[C::Plane(C::position_low + a)] + s);
+      Pack high = read<Pack>(from[C::Plane(C::position + a)] + s),
+           low = read<Pack>(from[C::Plane(C::position_low + a)] + s);
       addTwoWords(high, low, Pack(Pack(scale) * read<Pack>(increment[a] + s)));
       write(to[C::Plane(C::position + a)] + s, high);
       write(to[C::Plane(C::position_low + a)] + s, low);
@@ -72,7 +79,8 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
   return updateFrames(from, increment, scale, r, to);
 }
 
-/// Replaces the additive positions of a rod: chains where an end is free, corrections between held vertices and around rings.
+/// Replaces the additive positions of a rod: chains where an end is free, corrections between held vertices and around
+/// rings.
 [[gnu::flatten]] bool Retraction::restoreLengths(const C &from, int r, RetractionKind kind, C &to) {
   using std::sqrt;
   const RodRange &rod = elements_.rods[r];
@@ -81,7 +89,8 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
     const Vector3<Pack> edge = to.edges<Pack>(s); // e + scale de
     const FrameOf<Pack> before = from.frames<Pack>(s);
     Pack want = before.tangent.dot(edge);
-    if (kind == RetractionKind::continued) want -= (edge - before.tangent * before.length).squaredNorm() / (Pack(2.0) * before.length);
+    if (kind == RetractionKind::continued)
+      want -= (edge - before.tangent * before.length).squaredNorm() / (Pack(2.0) * before.length);
     if (kind == RetractionKind::kept) want = before.length;
     const Pack length = sqrt(edge.squaredNorm());
     if (any_of(!(want > Pack(0.0) && length > Pack(0.0)) && firstLanes(rod.edgeEnd() - s))) return false;
@@ -147,15 +156,17 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
   return true;
 }
 
-/// Two Newton sweeps that move the vertices between the slots `first` and `last` the least, in the norm of the softness, towards the target
-/// lengths. The compliance of the edges keeps the system regular where the lengths cannot be met. A closed rod is one span whose last edge
-/// meets its first; the corner of its cyclic system enters as a rank-one change (Sherman and Morrison 1950).
+/// Two Newton sweeps that move the vertices between the slots `first` and `last` the least, in the norm of the
+/// softness, towards the target lengths. The compliance of the edges keeps the system regular where the lengths cannot
+/// be met. A closed rod is one span whose last edge meets its first; the corner of its cyclic system enters as a
+/// rank-one change (Sherman and Morrison 1950).
 [[gnu::flatten]] void Retraction::projectSpan(const RodRange &rod, int first, int last, C &to) {
   using std::sqrt, std::abs;
   double *soft = work_[softness], *diag = work_[diagonal], *up = work_[upper], *rhs = work_[right], *z = work_[corner];
   const int end = last - 1;
   constexpr int most_sweeps = 10;
-  // Of a length: its last bits are no reason to move vertices, sideways and many times as far where a span is nearly straight.
+  // Of a length: its last bits are no reason to move vertices, sideways and many times as far where a span is nearly
+  // straight.
   constexpr double rounding = 4 * std::numeric_limits<double>::epsilon();
   double before = HUGE_VAL;
   for (int sweep = 0; sweep < most_sweeps; ++sweep) {
@@ -176,7 +187,8 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
       write(diag + s, select(live, Pack(read<Pack>(soft + s) + read<Pack>(soft + s + 1) + compliance), Pack(1.0)));
     }
     for (int s = first; s < end; s += lanes)
-      write(up + s, Pack(-read<Pack>(soft + s + 1) * readVector<Pack>(work_, direction, s).dot(readVector<Pack>(work_, direction, s + 1))));
+      write(up + s, Pack(-read<Pack>(soft + s + 1) *
+                         readVector<Pack>(work_, direction, s).dot(readVector<Pack>(work_, direction, s + 1))));
     double cyclic = 0, gamma = 0;
     if (rod.closed) {
       cyclic = -soft[first] * work_.vector(direction, first).dot(work_.vector(direction, end));
@@ -213,7 +225,8 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
   if (rod.closed) to.closeRing(rod);
 }
 
-[[gnu::flatten]] bool Retraction::updateFrames(const C &from, const Planes &increment, double scale, int r, C &to) const {
+[[gnu::flatten]] bool Retraction::updateFrames(const C &from, const Planes &increment, double scale, int r,
+                                               C &to) const {
   using std::floor, std::sqrt;
   const RodRange &rod = elements_.rods[r];
   const Energy energy = elements_.energy[r];
@@ -236,8 +249,8 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
     write(to[C::spin] + s, Pack(read<Pack>(from[C::spin] + s) + angle));
   }
   to.closeRing(rod);
-  // Whole turns of the twist angle by continuity: the angle moves by the difference of the two spins, and by a little holonomy. Half a turn
-  // is a barrier of the measure `tan`: no step leads across it.
+  // Whole turns of the twist angle by continuity: the angle moves by the difference of the two spins, and by a little
+  // holonomy. Half a turn is a barrier of the measure `tan`: no step leads across it.
   bool possible = true;
   const bool barrier = elements_.measure[r] == Measure::tan;
   forCells(elements_, r, [&]<class T>(const LooseCell &cell, int count) {

@@ -33,7 +33,8 @@ void Configuration::copyRod(const Elements &elements, int r, const Configuration
 void Configuration::closeRing(const RodRange &rod) {
   if (!rod.closed) return;
   const int behind = rod.vertexEnd();
-  for (const int i : {0, 1}) setPosition(behind + i, positionAt(rod.slot(i)), values_.vector(position_low, rod.slot(i)));
+  for (const int i : {0, 1})
+    setPosition(behind + i, positionAt(rod.slot(i)), values_.vector(position_low, rod.slot(i)));
   setFrame(behind, frameAt(rod.slot(0)));
   for (const Plane p : {strain, spin, axial_force}) values_[p][behind] = values_[p][rod.slot(0)];
 }
@@ -79,16 +80,19 @@ Frame supportFrame(const Support &support, double motion_time) {
 
 void setSupports(const Scene &scene, const Elements &elements, double motion_time, Configuration &c) {
   for (std::size_t s = 0; s < scene.supports.size(); ++s)
-    if (elements.support_slot[s] >= 0) c.setFrame(elements.support_slot[s], supportFrame(scene.supports[s], motion_time));
+    if (elements.support_slot[s] >= 0)
+      c.setFrame(elements.support_slot[s], supportFrame(scene.supports[s], motion_time));
 }
 
 [[gnu::flatten]] void setRod(const State &state, const Elements &elements, int r, Configuration &c) {
   using C = Configuration;
   using std::sqrt;
   const RodRange &rod = elements.rods[r];
-  for (int n = elements.rod_cells[r]; n < elements.rod_cells[r + 1]; ++n) c[C::turns][elements.cell_slot[n]] = state.turns[n];
+  for (int n = elements.rod_cells[r]; n < elements.rod_cells[r + 1]; ++n)
+    c[C::turns][elements.cell_slot[n]] = state.turns[n];
   for (int a = 0; a < 3; ++a) { // plane by plane
-    double *high = c[C::Plane(C::position + a)] + rod.first_slot, *low = c[C::Plane(C::position_low + a)] + rod.first_slot;
+    double *high = c[C::Plane(C::position + a)] + rod.first_slot,
+           *low = c[C::Plane(C::position_low + a)] + rod.first_slot;
     for (int i = 0; i < rod.vertices; ++i) {
       high[i] = state.position[rod.first_vertex + i][a];
       low[i] = state.position_low[rod.first_vertex + i][a];
@@ -112,16 +116,19 @@ void setSupports(const Scene &scene, const Elements &elements, double motion_tim
       write(t, select(live, Pack(e[a] / l), read<Pack>(t)));
     }
     write(c[C::length] + s, length);
-    write(c[C::strain] + s, axialStrain<Pack>(elements.energy[r], length, read<Pack>(elements.inverseRestLength() + s)));
+    write(c[C::strain] + s,
+          axialStrain<Pack>(elements.energy[r], length, read<Pack>(elements.inverseRestLength() + s)));
   }
   c.closeRing(rod);
   forCells(elements, r, [&]<class T>(const LooseCell &cell, int count) {
     const auto frames = cellFrames<T>(c, cell, count);
-    write(c[C::twist] + cell.slot, T(halfAngleBetween(frames[0], frames[1]).angle() + read<T>(c[C::turns] + cell.slot)));
+    write(c[C::twist] + cell.slot,
+          T(halfAngleBetween(frames[0], frames[1]).angle() + read<T>(c[C::turns] + cell.slot)));
   });
 }
 
-void carryFrames(const StageRule &rule, const Elements &elements, int r, const Configuration &from, Configuration &reference) {
+void carryFrames(const StageRule &rule, const Elements &elements, int r, const Configuration &from,
+                 Configuration &reference) {
   const RodRange &rod = elements.rods[r];
   reference.copyRod(elements, r, from);
   auto moved = [&](const Combination &by, int i) {
@@ -140,7 +147,9 @@ void carryFrames(const StageRule &rule, const Elements &elements, int r, const C
       const Vec3 middle = (f.tangent * f.length + (moved(rule.halfway, i + 1) - moved(rule.halfway, i))).normalized();
       if (middle.dot(f.tangent) > 0.1 && middle.dot(tangent) > 0.1) {
         const Vec3 by_way = transport<double>(transport<double>(f.director, f.tangent, middle), middle, tangent);
-        const double triangle = halfAngleBetween<double>({tangent, director, 1.0}, {tangent, orthonormalised(by_way, tangent), 1.0}).angle();
+        const double triangle =
+            halfAngleBetween<double>({tangent, director, 1.0}, {tangent, orthonormalised(by_way, tangent), 1.0})
+                .angle();
         director = rotateAbout<double>(director, tangent, 4.0 / 3 * triangle);
       }
     }

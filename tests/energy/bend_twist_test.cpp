@@ -21,7 +21,8 @@ template <Measure measure> D referenceEnergy(const RandomCell &c) {
   std::array<D, cell_size> q;
   for (int k = 0; k < cell_size; ++k) q[k] = D::variable(0.0, k);
   const Vector3<D> u0(q[0], q[1], q[2]), u1(q[4], q[5], q[6]), u2(q[8], q[9], q[10]);
-  const FrameOf<D> f0 = moved(c.f0, u0, u1, q[3], c.cell.free[0] != 0), f1 = moved(c.f1, u1, u2, q[7], c.cell.free[1] != 0);
+  const FrameOf<D> f0 = moved(c.f0, u0, u1, q[3], c.cell.free[0] != 0),
+                   f1 = moved(c.f1, u1, u2, q[7], c.cell.free[1] != 0);
   return cellEnergy<measure>(f0, f1, cast<D>(c.cell));
 }
 
@@ -43,20 +44,25 @@ template <Measure measure> void expectMatch(const RandomCell &c, double toleranc
   CellDerivatives<double> d;
   cellDerivatives<measure>(c.f0, c.f1, c.cell, d);
   double gradient_error = 0, hessian_error = 0;
-  for (int r = 0; r < cell_size; ++r) gradient_error = std::max(gradient_error, std::abs(d.gradient[r] - reference.g[r]));
+  for (int r = 0; r < cell_size; ++r)
+    gradient_error = std::max(gradient_error, std::abs(d.gradient[r] - reference.g[r]));
   Eigen::Matrix<double, cell_variables, cell_variables> h;
   for (int r = 0, k = 0; r < cell_variables; ++r)
     for (int j = r; j < cell_variables; ++j, ++k) h(r, j) = h(j, r) = d.hessian[k];
   const auto to_edges = edgeVariables();
   const Eigen::Matrix<double, cell_size, cell_size> over_vertices = to_edges.transpose() * h * to_edges;
   for (int r = 0; r < cell_size; ++r)
-    for (int j = r; j < cell_size; ++j) hessian_error = std::max(hessian_error, std::abs(over_vertices(r, j) - reference.h(r, j)));
-  // 1e-10 relative: the conditioning of the fold (1 + cos 170 deg = 0.015, to the third power) times rounding stays well below it.
+    for (int j = r; j < cell_size; ++j)
+      hessian_error = std::max(hessian_error, std::abs(over_vertices(r, j) - reference.h(r, j)));
+  // 1e-10 relative: the conditioning of the fold (1 + cos 170 deg = 0.015, to the third power) times rounding stays
+  // well below it.
   EXPECT_LT(gradient_error, tolerance * reference.g.cwiseAbs().maxCoeff());
   EXPECT_LT(hessian_error, tolerance * reference.h.cwiseAbs().maxCoeff());
   const std::array<double, cell_size> alone = cellGradient<measure>(c.f0, c.f1, c.cell);
-  for (int r = 0; r < cell_size; ++r) EXPECT_NEAR(alone[r], d.gradient[r], tolerance * reference.g.cwiseAbs().maxCoeff());
-  EXPECT_NEAR(cellEnergy<measure>(c.f0, c.f1, c.cell), reference.v, std::max(1e-13, 0.5 * (tolerance - 1e-10)) * std::abs(reference.v));
+  for (int r = 0; r < cell_size; ++r)
+    EXPECT_NEAR(alone[r], d.gradient[r], tolerance * reference.g.cwiseAbs().maxCoeff());
+  EXPECT_NEAR(cellEnergy<measure>(c.f0, c.f1, c.cell), reference.v,
+              std::max(1e-13, 0.5 * (tolerance - 1e-10)) * std::abs(reference.v));
 }
 
 template <Measure measure> void expectDerivativesMatch(const RandomCell &c, double tolerance = 1e-10) {
@@ -166,7 +172,8 @@ TEST(BendTwist, PackLanesEqualScalars) {
     cellDerivatives<Measure::angle>(cells[lane].f0, cells[lane].f1, cells[lane].cell, scalar);
     double size = 0;
     for (double v : scalar.hessian) size = std::max(size, std::abs(v));
-    for (int k = 0; k < cell_pairs; ++k) EXPECT_NEAR(double(packed.hessian[k][lane]), scalar.hessian[k], 1e-13 * size); // fused multiply-add
+    for (int k = 0; k < cell_pairs; ++k)
+      EXPECT_NEAR(double(packed.hessian[k][lane]), scalar.hessian[k], 1e-13 * size); // fused multiply-add
   }
 }
 

@@ -1,5 +1,5 @@
-/// Internal forces and moments against the loads they carry, and strains against shapes that are known. Balances hold at any edge length, to the
-/// tolerance of the solver, which is asked for here as 1e-10 of the load.
+/// Internal forces and moments against the loads they carry, and strains against shapes that are known. Balances hold
+/// at any edge length, to the tolerance of the solver, which is asked for here as 1e-10 of the load.
 #include "support/rods.hpp"
 
 #include "tendril/energy/derived.hpp"
@@ -8,7 +8,8 @@
 namespace tendril::test {
 namespace {
 
-constexpr double exact = 1e-8; // of loads of about 1: the solver's 1e-10 summed over edges, and the rounding of a stiff rod
+constexpr double exact =
+    1e-8; // of loads of about 1: the solver's 1e-10 summed over edges, and the rounding of a stiff rod
 
 /// A rod that bends, shears its tangents, twists and stretches by some per cent under loads of about 1.
 Rod softRod(int edges, Measure measure) {
@@ -34,8 +35,12 @@ void takeEleventhStep(Simulation &sim, double dt) {
   ASSERT_TRUE(finished);
 }
 
-RodActions actionsOf(const Simulation &sim) { return rodActions(sim.scene, *sim.elements, sim.state, sim.state.time, 1); }
-RodStrains strainsOf(const Simulation &sim) { return rodStrains(sim.scene, *sim.elements, sim.state, sim.state.time, 1); }
+RodActions actionsOf(const Simulation &sim) {
+  return rodActions(sim.scene, *sim.elements, sim.state, sim.state.time, 1);
+}
+RodStrains strainsOf(const Simulation &sim) {
+  return rodStrains(sim.scene, *sim.elements, sim.state, sim.state.time, 1);
+}
 
 /// Cantilevers of both measures and energies under a load at the tip, coarse and fine: `check(sim, edges)`.
 template <class Check> void eachCantilever(const Vec3 &load, Check check) {
@@ -63,7 +68,9 @@ TEST(InternalMoment, OfACantileverIsTheLeverArmAtEveryVertex) {
   const Vec3 load(0.3, -1.5, 0.7);
   eachCantilever(load, [&](const Simulation &sim, int edges) {
     const RodActions actions = actionsOf(sim);
-    for (int v = 0; v <= edges; ++v) EXPECT_LT((actions.moment[v] - (sim.state.position[edges] - sim.state.position[v]).cross(load)).norm(), exact) << v;
+    for (int v = 0; v <= edges; ++v)
+      EXPECT_LT((actions.moment[v] - (sim.state.position[edges] - sim.state.position[v]).cross(load)).norm(), exact)
+          << v;
     EXPECT_GT(actions.moment[0].norm(), 1);
   });
 }
@@ -81,7 +88,8 @@ TEST(InternalMoment, OfARodClampedAtItsEndIsTheLeverArm) {
   solve(sim, scene);
   const RodActions actions = actionsOf(sim);
   for (const Vec3 &force : actions.force) EXPECT_LT((force + load).norm(), exact);
-  for (int v = 0; v <= edges; ++v) EXPECT_LT((actions.moment[v] + (sim.state.position[0] - sim.state.position[v]).cross(load)).norm(), exact) << v;
+  for (int v = 0; v <= edges; ++v)
+    EXPECT_LT((actions.moment[v] + (sim.state.position[0] - sim.state.position[v]).cross(load)).norm(), exact) << v;
 }
 
 TEST(InternalMoment, BesideAClampInsideARodIsThatOfTheHigherSide) {
@@ -97,8 +105,8 @@ TEST(InternalMoment, BesideAClampInsideARodIsThatOfTheHigherSide) {
   const RodActions actions = actionsOf(sim);
   for (int i = 0; i < edges; ++i) EXPECT_LT((actions.force[i] - (i < 4 ? Vec3(-first) : last)).norm(), exact);
   for (int v = 0; v <= edges; ++v) {
-    const Vec3 expected =
-        v < 4 ? Vec3((sim.state.position[v] - sim.state.position[0]).cross(first)) : Vec3((sim.state.position[edges] - sim.state.position[v]).cross(last));
+    const Vec3 expected = v < 4 ? Vec3((sim.state.position[v] - sim.state.position[0]).cross(first))
+                                : Vec3((sim.state.position[edges] - sim.state.position[v]).cross(last));
     EXPECT_LT((actions.moment[v] - expected).norm(), exact) << v;
   }
 }
@@ -111,7 +119,8 @@ TEST(InternalMoment, AtAMovedClampIsTheLeverArm) {
   scene.supports[0].motion.angular_velocity = Vec3(0.3, 0.5, -0.4);
   Simulation sim;
   solve(sim, scene, 4);
-  EXPECT_LT((actionsOf(sim).moment[0] - (sim.state.position[12] - sim.state.position[0]).cross(Vec3(0, -1, 0))).norm(), exact);
+  EXPECT_LT((actionsOf(sim).moment[0] - (sim.state.position[12] - sim.state.position[0]).cross(Vec3(0, -1, 0))).norm(),
+            exact);
 }
 
 TEST(InternalForce, OfAHangingRodIsTheWeightBelow) {
@@ -125,7 +134,8 @@ TEST(InternalForce, OfAHangingRodIsTheWeightBelow) {
   Simulation sim;
   solve(sim, scene);
   const RodActions actions = actionsOf(sim);
-  for (int i = 0; i < edges; ++i) EXPECT_LT((actions.force[i] - Vec3(0, -3.0 * (edges - i - 0.5) / edges, 0)).norm(), exact) << i;
+  for (int i = 0; i < edges; ++i)
+    EXPECT_LT((actions.force[i] - Vec3(0, -3.0 * (edges - i - 0.5) / edges, 0)).norm(), exact) << i;
   for (const Vec3 &moment : actions.moment) EXPECT_LT(moment.norm(), exact);
 }
 
@@ -139,7 +149,8 @@ TEST(InternalMoment, OfASaggingRodIsThatOfTheWeightBeyond) {
   for (int v = 0; v <= edges; ++v) {
     Vec3 expected = Vec3::Zero();
     for (int w = v; w <= edges; ++w)
-      expected += sim.elements->mass()[sim.elements->vertex_slot[w]] * (sim.state.position[w] - sim.state.position[v]).cross(scene.gravity);
+      expected += sim.elements->mass()[sim.elements->vertex_slot[w]] *
+                  (sim.state.position[w] - sim.state.position[v]).cross(scene.gravity);
     EXPECT_LT((actions.moment[v] - expected).norm(), 10 * exact) << v; // loads of 8
   }
 }
@@ -212,7 +223,8 @@ TEST(InternalForce, AcceleratesTheVertices) {
   const RodActions actions = actionsOf(sim);
   for (int v = 1; v <= edges; ++v) {
     const Vec3 beyond = v < edges ? actions.force[v] : Vec3(Vec3::Zero());
-    const Vec3 rate = sim.elements->mass()[sim.elements->vertex_slot[v]] * ((sim.state.velocity[v] - before[v]) / dt - scene.gravity);
+    const Vec3 rate =
+        sim.elements->mass()[sim.elements->vertex_slot[v]] * ((sim.state.velocity[v] - before[v]) / dt - scene.gravity);
     EXPECT_LT((beyond - actions.force[v - 1] - rate).norm(), 1e-7) << v; // differences of positions over dt^2
   }
 }
@@ -232,7 +244,8 @@ TEST(Reaction, OfAllSupportsIsTheLoad) {
   EXPECT_LT((reaction[0] + reaction[2] + Vec3(0, -3 - 0.5, 2.5)).norm(), 10 * exact);
 }
 
-/// Force and moment of the whole rod: what supports do, loads on held vertices, weights and couples sum to nothing, about the origin too.
+/// Force and moment of the whole rod: what supports do, loads on held vertices, weights and couples sum to nothing,
+/// about the origin too.
 TEST(ReactionMoment, BalancesTheWholeRod) {
   const int edges = 12;
   for (const Measure measure : {Measure::tan, Measure::angle})
@@ -264,7 +277,8 @@ TEST(ReactionMoment, BalancesTheWholeRod) {
           add(scene.supports[s].vertex, actions.reaction[s]);
           moment += actions.reaction_moment[s];
         }
-        for (const EdgeMoment &m : scene.moments) moment += m.moment + m.torque * (sim.state.position[m.edge + 1] - sim.state.position[m.edge]).normalized();
+        for (const EdgeMoment &m : scene.moments)
+          moment += m.moment + m.torque * (sim.state.position[m.edge + 1] - sim.state.position[m.edge]).normalized();
         const double tolerance = couples ? 1e-5 : 10 * exact; // with couples Newton converges linearly; loads of 8
         EXPECT_LT(force.norm(), tolerance);
         EXPECT_LT(moment.norm(), tolerance);
@@ -318,7 +332,8 @@ TEST(Reaction, OfAMovingPinPullsTheRodAlong) {
   const Vec3 before = momentum();
   takeEleventhStep(sim, dt);
   const Vec3 expected = (momentum() - before) / dt + 0.7 * momentum() - scene.gravity * rod.material.linear_density;
-  EXPECT_LT((actionsOf(sim).reaction[0] - expected).norm(), 1e-6) << expected.norm(); // differences of positions over dt^2, of 13 vertices
+  EXPECT_LT((actionsOf(sim).reaction[0] - expected).norm(), 1e-6)
+      << expected.norm(); // differences of positions over dt^2, of 13 vertices
 }
 
 TEST(Strains, OfARingAreItsCurvature) {
@@ -362,7 +377,8 @@ TEST(Strains, CountWholeTurns) {
   }
 }
 
-/// A damped spring on its way beside a cable: over the vertices, the densities add up to the energies of the diagnostics.
+/// A damped spring on its way beside a cable: over the vertices, the densities add up to the energies of the
+/// diagnostics.
 TEST(StrainEnergyDensity, AddsUpToTheEnergy) {
   Rod spring;
   spring.name = "spring";
@@ -384,7 +400,8 @@ TEST(StrainEnergyDensity, AddsUpToTheEnergy) {
   const RodStrains strains = strainsOf(sim);
   std::vector<double> length(sim.state.position.size(), 0.0);
   for (std::size_t i = 0; i < sim.state.director.size(); ++i)
-    for (const int v : {sim.elements->vertex0[i], sim.elements->vertex1[i]}) length[v] += 0.5 * sim.elements->restLength()[sim.elements->edge_slot[i]];
+    for (const int v : {sim.elements->vertex0[i], sim.elements->vertex1[i]})
+      length[v] += 0.5 * sim.elements->restLength()[sim.elements->edge_slot[i]];
   double sum = 0;
   for (std::size_t v = 0; v < length.size(); ++v) sum += strains.strain_energy_density[v] * length[v];
   const EnergyBudget budget = energyBudget(sim.scene, *sim.elements, sim.state, 1);

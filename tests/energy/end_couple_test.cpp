@@ -1,6 +1,6 @@
 /// Energies under couples at an end, of which half an edge has no cell.
-#include "tendril/energy/derived.hpp"
 #include "tendril/accuracy/accuracy.hpp"
+#include "tendril/energy/derived.hpp"
 #include "tendril/io/scene_reader.hpp"
 
 #include "support/rods.hpp"
@@ -68,11 +68,13 @@ TEST(EndCouple, StoresEnergiesOfSecondOrder) {
       EXPECT_NEAR(order(e[1] - e[0], e[2] - e[1]), 2, order_tolerance);
       EXPECT_NEAR(order(e[2] - e[1], e[3] - e[2]), 2, order_tolerance);
       const double exact = e[4] + (e[4] - e[3]) / 3;
-      for (int k = 0; k < 3; ++k) EXPECT_NEAR((e[k] - e[k + 1]) * 4 / 3, e[k] - exact, 0.1 * std::abs(e[k] - exact)) << k; // asked for
+      for (int k = 0; k < 3; ++k)
+        EXPECT_NEAR((e[k] - e[k + 1]) * 4 / 3, e[k] - exact, 0.1 * std::abs(e[k] - exact)) << k; // asked for
     }
 }
 
-/// Loads that grow from nothing do the work that is stored: the couple's is that of its edge, and of the half edge beyond.
+/// Loads that grow from nothing do the work that is stored: the couple's is that of its edge, and of the half edge
+/// beyond.
 TEST(EndCouple, DoesTheWorkThatIsStored) {
   const int edges = 16, steps = 400;
   const Vec3 moment(0, 0, 2);
@@ -108,8 +110,9 @@ TEST(EndCouple, IsInTheDensityOfTheEnergy) {
   double sum = 0;
   for (int v = 0; v <= edges; ++v) sum += strains.strain_energy_density[v] * (v == 0 || v == edges ? 0.5 : 1) / edges;
   const EnergyBudget budget = energyBudget(run.scene, *run.elements, run.state, 1);
-  EXPECT_NEAR(sum, budget.stretch + budget.bend + budget.twist, 1e-12 * sum);                        // the same numbers added up
-  EXPECT_NEAR(strains.strain_energy_density[edges], strains.strain_energy_density[edges - 1], 1e-2); // of one along the rod but for its twist
+  EXPECT_NEAR(sum, budget.stretch + budget.bend + budget.twist, 1e-12 * sum); // the same numbers added up
+  EXPECT_NEAR(strains.strain_energy_density[edges], strains.strain_energy_density[edges - 1],
+              1e-2); // of one along the rod but for its twist
 }
 
 /// Where the end is held, cells reach it.

@@ -48,7 +48,8 @@ TEST(Energy, RestStateHasNoEnergyAndNoForce) {
       EXPECT_PETSC(sim.setUp(scene, statics()));
       EXPECT_LT(stored(sim, sim.state), 1e-28); // rounding of strains, squared
       sim.solver.begin(sim.state, {});
-      for (const double g : sim.potential->derivatives().gradient) EXPECT_LT(std::abs(g), 1e-11); // stiffness 50/0.25 times rounding
+      for (const double g : sim.potential->derivatives().gradient)
+        EXPECT_LT(std::abs(g), 1e-11); // stiffness 50/0.25 times rounding
     }
 }
 
@@ -148,8 +149,10 @@ TEST(Stretch, DerivativesMatchAutomaticDifferentiation) {
     const double inverse = 1 / (1 + 0.3 * random()), stiffness = 3, rest = 0.1 * random();
     std::array<D, 4> q;
     for (int k = 0; k < 4; ++k) q[k] = D::variable(0, k);
-    const D strain = axialStrain<D>(energy, moved(c.f1, q).length, D(inverse)) - D(rest), reference = D(0.5 * stiffness / inverse) * strain * strain;
-    const double force = stiffness * (axialStrain(energy, c.f1.length, inverse) - rest), slope = strainSlope(energy, c.f1.length, inverse);
+    const D strain = axialStrain<D>(energy, moved(c.f1, q).length, D(inverse)) - D(rest),
+            reference = D(0.5 * stiffness / inverse) * strain * strain;
+    const double force = stiffness * (axialStrain(energy, c.f1.length, inverse) - rest),
+                 slope = strainSlope(energy, c.f1.length, inverse);
     const Vec3 g = stretchGradient(c.f1, force, slope);
     const Mat3 h = stretchHessian(energy, c.f1, stiffness, force, inverse, slope);
     for (int r = 0; r < 3; ++r) {
@@ -182,7 +185,8 @@ TEST(BendTwist, AntisymmetricPartOfTheMovingGradientIsKnown) {
       moving.col(j) = (g[1] - g[0]) / (2 * step);
     }
     const Mat3 expected = crossMatrix<double>(c.f1.tangent) * (d.gradient[7] / (c.f1.length * c.f1.length));
-    EXPECT_LT((moving - moving.transpose() - expected).norm(), 1e-7 * moving.norm()); // central differences with step 1e-6
+    EXPECT_LT((moving - moving.transpose() - expected).norm(),
+              1e-7 * moving.norm()); // central differences with step 1e-6
     Mat3 hessian;
     for (int a = 0; a < 3; ++a)
       for (int b = a; b < 3; ++b) {

@@ -18,7 +18,8 @@ struct Case {
 
 /// A bent and twisted rod of unit length, soft enough that stretch, bending and twist are of one size.
 Rod softRod(Measure measure) {
-  Rod rod = inextensibleRod(helixShape({Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY(), 0.8, 0.1, 1, 0, 10}).points, measure);
+  Rod rod =
+      inextensibleRod(helixShape({Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY(), 0.8, 0.1, 1, 0, 10}).points, measure);
   rod.material.axial_stiffness = 60;
   rod.material.flexural_stiffness = {1, 1.6};
   rod.material.linear_density = 1;
@@ -214,19 +215,22 @@ TEST(EveryTerm, HasTheDerivativeOfItsForces) {
           const Planes up = bench.gradientAt(d, h), down = bench.gradientAt(d, -h);
           Planes change = bench.sim.dofs.makePlanes();
           for (int a = 0; a < slot_size; ++a)
-            for (int s = bench.rod().first_slot; s < bench.rod().vertexEnd(); ++s) change[a][s] = (up[a][s] - down[a][s]) / (2 * h);
+            for (int s = bench.rod().first_slot; s < bench.rod().vertexEnd(); ++s)
+              change[a][s] = (up[a][s] - down[a][s]) / (2 * h);
           return change;
         };
         const Planes fine = difference(small), coarse = difference(2 * small);
         Planes wrong = right;
         for (int a = 0; a < slot_size; ++a)
-          for (int s = bench.rod().first_slot; s < bench.rod().vertexEnd(); ++s) wrong[a][s] -= (4 * fine[a][s] - coarse[a][s]) / 3;
+          for (int s = bench.rod().first_slot; s < bench.rod().vertexEnd(); ++s)
+            wrong[a][s] -= (4 * fine[a][s] - coarse[a][s]) / 3;
         EXPECT_LT(std::sqrt(bench.dot(wrong, wrong) / bench.dot(right, right)), 1e-6);
       }
     }
 }
 
-/// The axial force as an unknown moves by what the linearised strain asks for: what is left, strain - S/k, falls with the square of the increment.
+/// The axial force as an unknown moves by what the linearised strain asks for: what is left, strain - S/k, falls with
+/// the square of the increment.
 TEST(MixedStretch, MovesItsForceWithTheStrain) {
   for (const Case &c : cases()) {
     if (c.dynamic) continue;
@@ -241,7 +245,8 @@ TEST(MixedStretch, MovesItsForceWithTheStrain) {
       EXPECT_TRUE(bench.potential().tryMove(d, scale, 0, RetractionKind::additive, trial));
       double sum = 0;
       for (int s = bench.rod().first_slot; s < bench.rod().edgeEnd(); ++s)
-        sum += std::abs(trial[Configuration::strain][s] - trial[Configuration::axial_force][s] / bench.sim.elements->axialStiffness()[s]);
+        sum += std::abs(trial[Configuration::strain][s] -
+                        trial[Configuration::axial_force][s] / bench.sim.elements->axialStiffness()[s]);
       return sum;
     };
     const double whole = left(1), half = left(0.5);
@@ -249,8 +254,8 @@ TEST(MixedStretch, MovesItsForceWithTheStrain) {
   }
 }
 
-/// From a disturbed answer. The order over three residuals above rounding, the better of the last two: 1 where a Hessian
-/// lacks something, 2 near enough to the answer; the very last may be half rounding.
+/// From a disturbed answer. The order over three residuals above rounding, the better of the last two: 1 where a
+/// Hessian lacks something, 2 near enough to the answer; the very last may be half rounding.
 TEST(EveryTerm, LetsNewtonConvergeQuadratically) {
   for (const Case &c : cases())
     for (const bool mixed : {false, true}) {

@@ -8,7 +8,9 @@
 namespace tendril::test {
 namespace {
 
-SceneFile verifyScene(const std::string &name) { return readScene(std::string(TENDRIL_SOURCE_DIR) + "/data/scenes/verify/" + name + ".yaml"); }
+SceneFile verifyScene(const std::string &name) {
+  return readScene(std::string(TENDRIL_SOURCE_DIR) + "/data/scenes/verify/" + name + ".yaml");
+}
 
 Vec3 elasticaTip(double load) {
   auto exact = referenceRow("elastica_tip_load.csv", load);
@@ -17,22 +19,27 @@ Vec3 elasticaTip(double load) {
 
 /// Largest distance from the exact helix of data/scenes/verify/spring.yaml over the rod's length.
 double springError(const std::vector<Vec3> &x) {
-  const double radius = 0.995204585596881, height = 4.12280613908148, length = 31.5359302715388; // helical_spring.csv, fixed, 5 degrees, zr 1.5
+  const double radius = 0.995204585596881, height = 4.12280613908148,
+               length = 31.5359302715388; // helical_spring.csv, fixed, 5 degrees, zr 1.5
   double worst = 0;
   for (std::size_t v = 0; v < x.size(); ++v) {
     const double s = double(v) / double(x.size() - 1), angle = 10 * pi * s;
-    worst = std::max(worst, (x[v] - Vec3(1 - radius + radius * std::cos(angle), radius * std::sin(angle), height * s)).norm() / length);
+    worst = std::max(worst,
+                     (x[v] - Vec3(1 - radius + radius * std::cos(angle), radius * std::sin(angle), height * s)).norm() /
+                         length);
   }
   return worst;
 }
 
-void estimateOf(const SceneFile &file, const std::vector<int> &edges, const LoopSettings &settings, Simulation &run, Estimate &estimate) {
+void estimateOf(const SceneFile &file, const std::vector<int> &edges, const LoopSettings &settings, Simulation &run,
+                Estimate &estimate) {
   std::vector<int> twice = edges;
   for (int &n : twice) n *= 2;
   Answer answer;
   EXPECT_PETSC(solveStatics(run, redraw(file.scene, file.drawings, edges), settings, &answer));
   ASSERT_TRUE(answer.found);
-  EXPECT_PETSC(estimateError(run, answer.rounding_error, answer.critical, redraw(file.scene, file.drawings, twice), settings, &estimate));
+  EXPECT_PETSC(estimateError(run, answer.rounding_error, answer.critical, redraw(file.scene, file.drawings, twice),
+                             settings, &estimate));
 }
 
 TEST(ErrorEstimate, IsTheErrorOfTheElastica) {
@@ -45,15 +52,17 @@ TEST(ErrorEstimate, IsTheErrorOfTheElastica) {
       Estimate e;
       estimateOf(file, {n}, statics(), run, e);
       ASSERT_EQ(e.none, "");
-      const double error = (run.state.position.back() - exact).norm(), extrapolated = (e.position.back() - exact).norm();
+      const double error = (run.state.position.back() - exact).norm(),
+                   extrapolated = (e.position.back() - exact).norm();
       const bool clean = measure == Measure::angle;
-      EXPECT_NEAR(e.error.back(), error, (clean ? 0.01 : 0.06) * error) << n; // of the next term in the series: h^4, or that of the boundary layer's
-      EXPECT_LT(extrapolated, error / 4 / (clean ? 100 : 2.5)) << n;          // error/4: that of the answer at h/2
+      EXPECT_NEAR(e.error.back(), error, (clean ? 0.01 : 0.06) * error)
+          << n; // of the next term in the series: h^4, or that of the boundary layer's
+      EXPECT_LT(extrapolated, error / 4 / (clean ? 100 : 2.5)) << n; // error/4: that of the answer at h/2
     }
 }
 
-/// A bar rolled up by an end couple of 9: the edges of a rod that keeps its length lie on a circle, edge i at (i + 1/2) 9/n from the clamp; the tip of the
-/// exact one is at (sin 9, 1 - cos 9)/9. Measure `angle`: within 1 %.
+/// A bar rolled up by an end couple of 9: the edges of a rod that keeps its length lie on a circle, edge i at (i + 1/2)
+/// 9/n from the clamp; the tip of the exact one is at (sin 9, 1 - cos 9)/9. Measure `angle`: within 1 %.
 TEST(ErrorEstimate, IsTheErrorOfAClassicalBar) {
   SceneFile file = readScene(std::string(TENDRIL_SOURCE_DIR) + "/data/scenes/rolled_up.yaml", {});
   Simulation run;
@@ -73,7 +82,8 @@ TEST(ErrorEstimate, IsTheErrorOfASpring) {
   estimateOf(file, {160}, statics(10), run, e);
   ASSERT_EQ(e.none, "");
   const double error = springError(run.state.position);
-  EXPECT_NEAR(e.relativeError(), error, 0.06 * error); // the clamps' tangents, extrapolated from the drawing, add a cubic term
+  EXPECT_NEAR(e.relativeError(), error,
+              0.06 * error); // the clamps' tangents, extrapolated from the drawing, add a cubic term
   EXPECT_LT(springError(e.position), error / 4 / 3);
 }
 
@@ -85,7 +95,8 @@ TEST(ErrorEstimate, OfPointsIsThatOfTheirCurve) {
   file.scene = redraw(file.scene, file.drawings, {64});
   file.drawings[0].curve = nullptr;
   estimateOf(file, {64}, statics(), points, of_points);
-  EXPECT_NEAR(of_points.relativeError(), of_curve.relativeError(), 0.1 * of_curve.relativeError()); // the cubics are off by h^4
+  EXPECT_NEAR(of_points.relativeError(), of_curve.relativeError(),
+              0.1 * of_curve.relativeError()); // the cubics are off by h^4
 }
 
 TEST(ErrorEstimate, StaysOnTheBranchOfABuckledColumn) {
@@ -115,7 +126,8 @@ TEST(ErrorEstimate, TellsWhenAnswersAreNotNeighbours) {
 /// Two answers may agree because both are lost in rounding.
 TEST(ErrorEstimate, IsNotBelowTheRoundingOfEitherAnswer) {
   const Scene scene = clampedScene(straightRod(1, Measure::angle, 2));
-  Answer coarse{true, "", 1, {Vec3(0, 0, 0), Vec3(2, 1, 0)}, {}, {}, 1e-3}, fine{true, "", 1, {Vec3(0, 0, 0), Vec3(1, 0.5, 0), Vec3(2, 1, 0)}, {}, {}, 2e-3};
+  Answer coarse{true, "", 1, {Vec3(0, 0, 0), Vec3(2, 1, 0)}, {}, {}, 1e-3},
+      fine{true, "", 1, {Vec3(0, 0, 0), Vec3(1, 0.5, 0), Vec3(2, 1, 0)}, {}, {}, 2e-3};
   const Estimate e = richardson(scene, coarse, fine);
   EXPECT_DOUBLE_EQ(e.rods[0].error, 3e-3 * 2); // both, over the length of 2
   EXPECT_DOUBLE_EQ(e.rods[0].tip, 3e-3 * 2);
@@ -155,7 +167,8 @@ TEST(Accuracy, IsMetOnASpring) {
     runTo(run, redraw(file.scene, file.drawings, choice.edges), statics(10));
     const double error = springError(run.state.position);
     EXPECT_LT(error, tolerance);
-    EXPECT_GT(error, tolerance / 3) << "too many edges: " << choice.edges[0]; // predicted from few edges, where the cubic term counts
+    EXPECT_GT(error, tolerance / 3) << "too many edges: "
+                                    << choice.edges[0]; // predicted from few edges, where the cubic term counts
   }
 }
 
@@ -198,20 +211,25 @@ TEST(Accuracy, GradedEdgesAreFewer) { // prints the table of docs/theory.md
     int load_steps;
     std::vector<double> tolerances;
   };
-  std::vector<Row> rows{{"hook", verifyScene("hook"), 4, {1e-2, 1e-3, 1e-4}},
-                        {"helix", readScene(std::string(TENDRIL_SOURCE_DIR) + "/data/scenes/helix.yaml"), 10, {1e-2, 1e-3, 1e-4}}};
+  std::vector<Row> rows{
+      {"hook", verifyScene("hook"), 4, {1e-2, 1e-3, 1e-4}},
+      {"helix", readScene(std::string(TENDRIL_SOURCE_DIR) + "/data/scenes/helix.yaml"), 10, {1e-2, 1e-3, 1e-4}}};
   rows[1].file.scene.supports[0].kind = Support::Kind::clamp; // by its pin alone it could turn for nothing
-  std::printf("%-6s %9s %8s %8s %8s %10s %10s\n", "scene", "tolerance", "as drawn", "equal", "graded", "estimated", "true");
+  std::printf("%-6s %9s %8s %8s %8s %10s %10s\n", "scene", "tolerance", "as drawn", "equal", "graded", "estimated",
+              "true");
   for (Row &row : rows)
     for (const double tolerance : row.tolerances) {
       const LoopSettings settings = statics(row.load_steps);
       SceneFile equal = row.file, graded = row.file;
       setEqualEdges(equal);
       grade(graded.scene, graded.drawings);
-      const Price a = priceOf(row.file, settings, tolerance), b = priceOf(equal, settings, tolerance), c = priceOf(graded, settings, tolerance);
-      std::printf("%-6s %9.0e %8d %8d %8d %10.2e %10.2e\n", row.name, tolerance, a.edges, b.edges, c.edges, c.estimated, c.error);
+      const Price a = priceOf(row.file, settings, tolerance), b = priceOf(equal, settings, tolerance),
+                  c = priceOf(graded, settings, tolerance);
+      std::printf("%-6s %9.0e %8d %8d %8d %10.2e %10.2e\n", row.name, tolerance, a.edges, b.edges, c.edges, c.estimated,
+                  c.error);
       EXPECT_LT(c.error, tolerance) << row.name;
-      EXPECT_NEAR(c.estimated, c.error, (tolerance > 5e-3 ? 0.05 : 0.03) * c.error) << row.name; // the first number of edges turns by 30 degrees a vertex
+      EXPECT_NEAR(c.estimated, c.error, (tolerance > 5e-3 ? 0.05 : 0.03) * c.error)
+          << row.name; // the first number of edges turns by 30 degrees a vertex
       EXPECT_LE(c.edges, std::min(a.edges, b.edges)) << row.name;
       if (tolerance < 5e-3 && &row == &rows[0]) EXPECT_LT(c.edges, 0.75 * std::min(a.edges, b.edges));
     }

@@ -27,18 +27,21 @@ Scene springScene(int edges = 40) {
   return scene;
 }
 
-/// A tolerance relative to EI/L^2 alone would accept standing still: its forces exceed those of so light a rod's inertia.
+/// A tolerance relative to EI/L^2 alone would accept standing still: its forces exceed those of so light a rod's
+/// inertia.
 TEST(FreeFlight, OfASlowLightRodKeepsItsVelocity) {
   Rod rod = straightRod(10, Measure::tan, 1e-4);
   rod.material = homogeneousMaterial({SectionShape::circle, {1e-6, 1e-6}}, 1e9, 4e8, 1000);
   rod.initial_velocity = Vec3(1e-3, 0, 0);
   Simulation sim;
   runTo(sim, freeScene(rod), dynamics(1e-3, 1e-2));
-  for (const Vec3 &v : sim.state.velocity) EXPECT_NEAR(v[0], 1e-3, 1.1e-7); // ten steps, each to 1e-6 of the momentum of eleven vertices
+  for (const Vec3 &v : sim.state.velocity)
+    EXPECT_NEAR(v[0], 1e-3, 1.1e-7); // ten steps, each to 1e-6 of the momentum of eleven vertices
 }
 
-/// The state is turned as a whole, ten thousand times, by the same moves that a step makes: additive increments of positions, twist increments
-/// beyond parallel transport, directors made orthonormal at the end. Parallel transport itself depends on the path; strains must not.
+/// The state is turned as a whole, ten thousand times, by the same moves that a step makes: additive increments of
+/// positions, twist increments beyond parallel transport, directors made orthonormal at the end. Parallel transport
+/// itself depends on the path; strains must not.
 TEST(RigidMotion, RepeatedTenThousandTimesLeavesTheStrains) {
   Simulation sim;
   EXPECT_PETSC(sim.setUp(springScene(), dynamics(0.01, 1)));
@@ -49,7 +52,8 @@ TEST(RigidMotion, RepeatedTenThousandTimesLeavesTheStrains) {
     std::vector<double> all;
     const Configuration c = configurationOf(s, sim.scene, e, 0);
     for (const int n : e.cell_slot)
-      if (e.cells()[cell_free][n] * e.cells()[cell_free + 1][n] == 1) // not the half cell of the clamp, whose frame stays
+      if (e.cells()[cell_free][n] * e.cells()[cell_free + 1][n] ==
+          1) // not the half cell of the clamp, whose frame stays
         for (const double strain : presentStrain<double>(e, c, 0, {n, n - 1, n, n})) all.push_back(strain);
     for (const int i : e.edge_slot) all.push_back(c[Configuration::strain][i]);
     return all;
@@ -60,9 +64,12 @@ TEST(RigidMotion, RepeatedTenThousandTimesLeavesTheStrains) {
     const Mat3 r = Eigen::AngleAxisd(1.5 * random(), random.direction()).toRotationMatrix();
     const Vec3 centre = s.position[20]; // stays near the origin
     for (std::size_t i = 0; i < s.director.size(); ++i) {
-      const Frame f{(s.position[i + 1] - s.position[i]).normalized(), s.director[i], 1}, turned{r * f.tangent, r * f.director, 1};
+      const Frame f{(s.position[i + 1] - s.position[i]).normalized(), s.director[i], 1},
+          turned{r * f.tangent, r * f.director, 1};
       const double beyond = twistIncrement(f, turned);
-      s.director[i] = orthonormalised(rotateAbout<double>(transport<double>(f.director, f.tangent, turned.tangent), turned.tangent, beyond), turned.tangent);
+      s.director[i] = orthonormalised(
+          rotateAbout<double>(transport<double>(f.director, f.tangent, turned.tangent), turned.tangent, beyond),
+          turned.tangent);
     }
     for (Vec3 &x : s.position) x = centre + r * (x - centre);
   }
@@ -74,8 +81,11 @@ TEST(RigidMotion, RepeatedTenThousandTimesLeavesTheStrains) {
 TEST(ClosedLoop, OfAClampReturnsTheEnergy) {
   Scene scene = clampedScene(straightRod(24, Measure::angle));
   scene.supports.push_back(hold(scene, 0, 24, Support::Kind::clamp));
-  scene.supports[1].motion.table = {{0, Vec3(-0.2, 0, 0), Vec3(0, 0, 0.5)},         {0.25, Vec3(-0.3, 0.1, 0), Vec3(0, 0.4, 0.5)}, {0.5, Vec3(-0.3, 0.1, 0.2), Vec3(0.6, 0.4, 0)},
-                                    {0.75, Vec3(-0.2, -0.1, 0.1), Vec3(0.3, 0, 1)}, {1, Vec3(-0.2, 0, 0), Vec3(0, 0, 0.5)}};
+  scene.supports[1].motion.table = {{0, Vec3(-0.2, 0, 0), Vec3(0, 0, 0.5)},
+                                    {0.25, Vec3(-0.3, 0.1, 0), Vec3(0, 0.4, 0.5)},
+                                    {0.5, Vec3(-0.3, 0.1, 0.2), Vec3(0.6, 0.4, 0)},
+                                    {0.75, Vec3(-0.2, -0.1, 0.1), Vec3(0.3, 0, 1)},
+                                    {1, Vec3(-0.2, 0, 0), Vec3(0, 0, 0.5)}};
   EXPECT_PETSC(PetscOptionsSetValue(nullptr, "-snes_rtol", "1e-10"));
   Simulation sim;
   const LoopSettings settings = statics(16);
@@ -89,7 +99,7 @@ TEST(ClosedLoop, OfAClampReturnsTheEnergy) {
     energies.push_back(energyBudget(sim.scene, *sim.elements, sim.state, 1).total());
   }
   EXPECT_PETSC(PetscOptionsClearValue(nullptr, "-snes_rtol"));
-  EXPECT_GT(energies[5], 1.1 * energies[0]); // it went somewhere
+  EXPECT_GT(energies[5], 1.1 * energies[0]);                                // it went somewhere
   EXPECT_NEAR(energies.back(), energies.front(), 1e-10 * energies.front()); // the first point lies 1e-12 along the loop
 }
 
@@ -98,13 +108,15 @@ void expectFailure(Simulation &sim, const LoopSettings &settings, const std::str
   const State before = sim.state;
   TimeLoop loop(sim.solver, settings);
   bool finished = true;
-  EXPECT_PETSC(loop.run(sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+  EXPECT_PETSC(loop.run(
+      sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
   EXPECT_FALSE(finished);
   EXPECT_TRUE(sim.state == before);
   EXPECT_NE(loop.failure().find(word), std::string::npos) << loop.failure();
 }
 
-/// A load that is not a number, as a faulty coupling would give: every step is rejected, the state stays bit for bit, the reason is told.
+/// A load that is not a number, as a faulty coupling would give: every step is rejected, the state stays bit for bit,
+/// the reason is told.
 TEST(TimeLoop, RejectsALoadThatIsNotANumber) {
   Scene scene = clampedScene(straightRod(8));
   scene.forces.push_back({0, 8, Vec3(0, NAN, 0)});
@@ -133,19 +145,24 @@ TEST(FoldBarrier, IsNotSteppedOver) {
   }
 }
 
-/// A clamp that travels by a table and turns, in both modes: the vertex is where the table says, and the edge beside it follows its frame.
+/// A clamp that travels by a table and turns, in both modes: the vertex is where the table says, and the edge beside it
+/// follows its frame.
 TEST(Motion, OfAClampIsFollowedExactly) {
   for (const bool dynamic : {false, true}) {
     Scene scene = clampedScene(straightRod(20));
     scene.rods[0].material.mass_damping_coefficient = 1e3; // dynamics without waves
     Motion &motion = scene.supports[0].motion;
-    motion.table = {{0, Vec3::Zero(), Vec3::Zero()}, {0.5, Vec3(0.1, 0.2, 0), Vec3(0, 0, 0.4)}, {1, Vec3(0.3, 0.2, 0.1), Vec3(0, 0, 1.2)}};
+    motion.table = {{0, Vec3::Zero(), Vec3::Zero()},
+                    {0.5, Vec3(0.1, 0.2, 0), Vec3(0, 0, 0.4)},
+                    {1, Vec3(0.3, 0.2, 0.1), Vec3(0, 0, 1.2)}};
     Simulation sim;
     runTo(sim, scene, dynamic ? dynamics(0.02, 1) : statics(7)); // 7: the break of the table lies inside a load step
     EXPECT_LT((sim.state.position[0] - Vec3(0.3, 0.2, 0.1)).norm(), 1e-15);
     if (dynamic) continue; // the rod bends behind the clamp
     const Vec3 axis(std::cos(1.2), std::sin(1.2), 0);
-    for (int v = 0; v <= 20; ++v) EXPECT_LT((sim.state.position[v] - sim.state.position[0] - axis * (v / 20.0)).norm(), 1e-7); // residual 1e-6 of EI/L^2
+    for (int v = 0; v <= 20; ++v)
+      EXPECT_LT((sim.state.position[v] - sim.state.position[0] - axis * (v / 20.0)).norm(),
+                1e-7); // residual 1e-6 of EI/L^2
   }
 }
 
@@ -161,11 +178,13 @@ TEST(TwistBarrier, IsNotSteppedOver) {
     EXPECT_PETSC(sim.setUp(scene, settings));
     TimeLoop loop(sim.solver, settings);
     bool finished;
-    EXPECT_PETSC(loop.run(sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+    EXPECT_PETSC(loop.run(
+        sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
     EXPECT_EQ(finished, measure == Measure::angle) << loop.failure() << sim.state.time;
     if (measure == Measure::angle) {
       const EnergyBudget e = energyBudget(sim.scene, *sim.elements, sim.state, 1);
-      EXPECT_NEAR(e.twist, 0.5 * rod.material.torsional_stiffness * 30 * 30, 1e-9 * e.twist); // GJ phi^2/(2 L), exact for uniform twist
+      EXPECT_NEAR(e.twist, 0.5 * rod.material.torsional_stiffness * 30 * 30,
+                  1e-9 * e.twist); // GJ phi^2/(2 L), exact for uniform twist
     } else {
       EXPECT_LT(sim.state.time, 5 * pi / 30); // three cells and two half cells, each below 180 degrees
       EXPECT_NE(loop.failure().find("barrier"), std::string::npos) << loop.failure();
@@ -184,7 +203,9 @@ TEST(FreeFall, IsBackwardEulersOwnSum) {
   runTo(sim, scene, dynamics(h, n * h));
   EXPECT_PETSC(PetscOptionsClearValue(nullptr, "-snes_rtol"));
   const Vec3 moved = Vec3(1, 2, 0) * n * h + scene.gravity * h * h * n * (n + 1) / 2;
-  for (int v = 0; v <= 10; ++v) EXPECT_LT((sim.state.position[v] - scene.rods[0].position[v] - moved).norm(), 1e-11); // 50 steps of the solver's 1e-11 of the weight
+  for (int v = 0; v <= 10; ++v)
+    EXPECT_LT((sim.state.position[v] - scene.rods[0].position[v] - moved).norm(),
+              1e-11); // 50 steps of the solver's 1e-11 of the weight
 }
 
 TEST(MassDamping, SlowsByItsOwnFactor) {
@@ -195,7 +216,8 @@ TEST(MassDamping, SlowsByItsOwnFactor) {
   scene.rods[0].material.mass_damping_coefficient = alpha;
   Simulation sim;
   runTo(sim, scene, dynamics(h, n * h));
-  for (const Vec3 &v : sim.state.velocity) EXPECT_LT((v - scene.rods[0].initial_velocity / std::pow(1 + alpha * h, n)).norm(), 1e-7);
+  for (const Vec3 &v : sim.state.velocity)
+    EXPECT_LT((v - scene.rods[0].initial_velocity / std::pow(1 + alpha * h, n)).norm(), 1e-7);
 }
 
 TEST(StiffnessDamping, DoesNotSeeRigidMotion) {
@@ -222,7 +244,8 @@ TEST(StiffnessDamping, DoesNotSeeRigidMotion) {
 }
 
 TEST(StiffnessDamping, IsTheRatePotentialOfTheStoredEnergy) {
-  // E with damping - E without = beta/dt x (stored energy of the strain increments), for every strain: h R((q - q_n)/h).
+  // E with damping - E without = beta/dt x (stored energy of the strain increments), for every strain: h R((q -
+  // q_n)/h).
   Scene scene = springScene();
   const LoopSettings settings = dynamics(0.01, 1);
   const double beta = 0.02;
@@ -247,7 +270,9 @@ TEST(StiffnessDamping, IsTheRatePotentialOfTheStoredEnergy) {
   const Configuration from = plain.potential->iterate();
   double expected = 0;
   const Elements &e = *plain.elements;
-  for (const int i : e.edge_slot) expected += 0.5 * e.axialStiffness()[i] * e.restLength()[i] * std::pow(to[Configuration::strain][i] - from[Configuration::strain][i], 2);
+  for (const int i : e.edge_slot)
+    expected += 0.5 * e.axialStiffness()[i] * e.restLength()[i] *
+                std::pow(to[Configuration::strain][i] - from[Configuration::strain][i], 2);
   for (const int c : e.cell_slot) {
     const LooseCell cell{c, c - 1, c, c};
     const auto s0 = presentStrain<double>(e, from, 0, cell), s1 = presentStrain<double>(e, to, 0, cell);
@@ -264,7 +289,8 @@ TEST(StiffnessDamping, LeavesStaticsUnchanged) {
   scene.rods[0].material.stiffness_damping_coefficient = 1;
   scene.rods[0].material.mass_damping_coefficient = 10;
   runTo(damped, scene, statics());
-  for (std::size_t v = 0; v < plain.state.position.size(); ++v) EXPECT_EQ(plain.state.position[v], damped.state.position[v]);
+  for (std::size_t v = 0; v < plain.state.position.size(); ++v)
+    EXPECT_EQ(plain.state.position[v], damped.state.position[v]);
 }
 
 /// One step of a simulation from its state.
@@ -290,7 +316,8 @@ TEST(Newton, ConvergesQuadratically) {
   // The order over the last drop that starts inside the quadratic range and ends above rounding.
   double best = 0;
   for (std::size_t k = 2; k < r.size(); ++k)
-    if (r[k - 1] < 1e-2 && r[k] > 1e-13) best = std::max(best, std::log(r[k] / r[k - 1]) / std::log(r[k - 1] / r[k - 2]));
+    if (r[k - 1] < 1e-2 && r[k] > 1e-13)
+      best = std::max(best, std::log(r[k] / r[k - 1]) / std::log(r[k - 1] / r[k - 2]));
   EXPECT_GE(best, 1.8);
 }
 
@@ -311,7 +338,8 @@ TEST(Newton, AnswerDoesNotDependOnTheFirstGuess) {
   EXPECT_GT(report.iterations, 2);
   sim.potential->commit(guessed);
   double largest = 0;
-  for (std::size_t v = 0; v < plain.position.size(); ++v) largest = std::max(largest, (plain.position[v] - guessed.position[v]).norm() / 0.5);
+  for (std::size_t v = 0; v < plain.position.size(); ++v)
+    largest = std::max(largest, (plain.position[v] - guessed.position[v]).norm() / 0.5);
   for (std::size_t i = 0; i < plain.director.size(); ++i) {
     largest = std::max(largest, (plain.director[i] - guessed.director[i]).norm());
     largest = std::max(largest, std::abs(plain.twist_rate[i] - guessed.twist_rate[i]) / 100);
@@ -375,7 +403,8 @@ TEST(TimeLoop, HalvesTheStepAndRecoversIt) {
 }
 
 TEST(Statics, CompressedColumnLeavesTheUnstableStraightState) {
-  // Clamped and free, compressed at 2.6 times the Euler load pi^2/4: the straight state is an equilibrium, but not a minimum.
+  // Clamped and free, compressed at 2.6 times the Euler load pi^2/4: the straight state is an equilibrium, but not a
+  // minimum.
   const int n = 32;
   Scene scene = clampedScene(straightRod(n));
   scene.forces = {{0, n, Vec3(-2.6 * pi * pi / 4, 0, 0)}};

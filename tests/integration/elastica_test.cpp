@@ -1,4 +1,5 @@
-/// Statics against exact solutions of the elastica (data/reference, each with its source), and the order of every boundary.
+/// Statics against exact solutions of the elastica (data/reference, each with its source), and the order of every
+/// boundary.
 #include "support/rods.hpp"
 
 namespace tendril::test {
@@ -36,7 +37,8 @@ double selfWeightError(int edges, double gamma) {
 }
 
 TEST(Elastica, FreeEndUnderSelfWeightIsSecondOrder) {
-  for (const double gamma : {1.0, 10.0, 100.0}) EXPECT_NEAR(order(selfWeightError(64, gamma), selfWeightError(128, gamma)), 2, tolerance) << gamma;
+  for (const double gamma : {1.0, 10.0, 100.0})
+    EXPECT_NEAR(order(selfWeightError(64, gamma), selfWeightError(128, gamma)), 2, tolerance) << gamma;
 }
 
 /// Pinned column shortened past buckling; the bump it is drawn with only breaks the symmetry.
@@ -46,8 +48,10 @@ double pinnedError(int edges, double shortening, double height) {
   Scene scene;
   scene.gravity = Vec3::Zero();
   scene.rods = {inextensibleRod(points, Measure::angle)};
-  scene.rods[0].material.flexural_stiffness = {1, 4}; // it bends about one axis only: a round rod may buckle in any plane
-  scene.supports = {hold(scene, 0, 0, Support::Kind::pin), hold(scene, 0, edges, Support::Kind::pin), hold(scene, 0, 0, Support::Kind::fix_twist)};
+  scene.rods[0].material.flexural_stiffness = {1,
+                                               4}; // it bends about one axis only: a round rod may buckle in any plane
+  scene.supports = {hold(scene, 0, 0, Support::Kind::pin), hold(scene, 0, edges, Support::Kind::pin),
+                    hold(scene, 0, 0, Support::Kind::fix_twist)};
   scene.supports[1].motion.velocity = Vec3(-shortening, 0, 0);
   Simulation sim;
   runTo(sim, scene, statics(8));

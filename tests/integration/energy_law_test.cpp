@@ -1,4 +1,5 @@
-/// The two laws of stretch and bending against closed forms: end couples, tension, compression, and the moment that `seed` bears at most.
+/// The two laws of stretch and bending against closed forms: end couples, tension, compression, and the moment that
+/// `seed` bears at most.
 #include "support/rods.hpp"
 
 #include "tendril/dynamics/bifurcation.hpp"
@@ -36,7 +37,9 @@ struct Solved {
     failure = loop.failure();
   }
   Vec3 edge(int i) const { return sim.state.position[i + 1] - sim.state.position[i]; }
-  double turning(int v) const { return std::acos(std::clamp(edge(v - 1).normalized().dot(edge(v).normalized()), -1.0, 1.0)); }
+  double turning(int v) const {
+    return std::acos(std::clamp(edge(v - 1).normalized().dot(edge(v).normalized()), -1.0, 1.0));
+  }
 };
 
 Scene coupleScene(Energy energy, int edges, double axial, double moment) {
@@ -66,7 +69,8 @@ TEST(EndMoment, ShortensARodOfTheSeed) {
   const double stretch = std::sqrt(1 - 2 * kappa * kappa / axial);
   const Solved s(coupleScene(Energy::seed, edges, axial, moment));
   ASSERT_TRUE(s.finished) << s.failure;
-  for (int v = 1; v <= edges / 2; ++v) { // the last edge has no cell behind it; what that changes falls by 20 from edge to edge
+  for (int v = 1; v <= edges / 2;
+       ++v) { // the last edge has no cell behind it; what that changes falls by 20 from edge to edge
     EXPECT_NEAR(s.edge(v - 1).norm() * edges, stretch, exact) << v;
     EXPECT_NEAR(s.turning(v) * edges, kappa, exact * kappa) << v;
   }
@@ -77,7 +81,8 @@ TEST(EndMoment, ShortensARodOfTheSeed) {
   for (int i = 0; i < edges; ++i) EXPECT_LT(actions.force[i].norm(), exact * axial) << i;
 }
 
-/// Far below the limit, whatever the load steps: no edge gives way that Newton has gone past. \param part of the largest moment
+/// Far below the limit, whatever the load steps: no edge gives way that Newton has gone past. \param part of the
+/// largest moment
 TEST(EndMoment, OfPartOfTheLimitLeavesNoEdgeThatHasGivenWay) {
   struct {
     double axial, part;
@@ -90,9 +95,11 @@ TEST(EndMoment, OfPartOfTheLimitLeavesNoEdgeThatHasGivenWay) {
         double kappa = moment;
         for (int k = 0; k < 200; ++k) kappa = moment / (1 - 2 * kappa * kappa / c.axial);
         const Solved s(coupleScene(Energy::seed, c.edges, c.axial, moment), steps, mixed);
-        SCOPED_TRACE(std::to_string(c.axial) + ", " + std::to_string(c.part) + ", " + std::to_string(steps) + (mixed ? "" : ", primal"));
+        SCOPED_TRACE(std::to_string(c.axial) + ", " + std::to_string(c.part) + ", " + std::to_string(steps) +
+                     (mixed ? "" : ", primal"));
         EXPECT_TRUE(s.finished) << s.failure;
-        for (int v = 0; v < c.edges && s.finished; ++v) // the end is softer by less than this; edges that give way are down to a half and less
+        for (int v = 0; v < c.edges && s.finished;
+             ++v) // the end is softer by less than this; edges that give way are down to a half and less
           EXPECT_NEAR(s.edge(v).norm() * c.edges, std::sqrt(1 - 2 * kappa * kappa / c.axial), 0.05) << v;
       }
 }
@@ -103,7 +110,8 @@ TEST(EndMoment, HasALimitUnderTheSeedAlone) {
   EXPECT_TRUE(Solved(coupleScene(Energy::seed, 20, 1e3, 0.99 * limit), 10).finished);
   const Solved over(coupleScene(Energy::seed, 20, 1e3, 9), 10);
   EXPECT_FALSE(over.finished);
-  EXPECT_NEAR(over.sim.state.time * 9, limit, 0.01 * limit); // load steps down to 1e-4; the last edge, half as bent, shortens less
+  EXPECT_NEAR(over.sim.state.time * 9, limit,
+              0.01 * limit); // load steps down to 1e-4; the last edge, half as bent, shortens less
   EXPECT_NE(over.failure.find("rod 'rod' bends under a moment of 8."), std::string::npos) << over.failure;
   EXPECT_NE(over.failure.find("= 8.607 N m"), std::string::npos) << over.failure;
   EXPECT_NE(over.failure.find("energy: classical"), std::string::npos) << over.failure;
@@ -125,19 +133,24 @@ TEST(Tension, StretchesByItsLaw) {
       ASSERT_TRUE(s.finished) << s.failure;
       double stretch = 1 + force / axial;
       if (energy == Energy::seed)
-        for (int k = 0; k < 100; ++k) stretch -= (axial * stretch * (stretch * stretch - 1) / 2 - force) / (axial * (3 * stretch * stretch - 1) / 2);
+        for (int k = 0; k < 100; ++k)
+          stretch -=
+              (axial * stretch * (stretch * stretch - 1) / 2 - force) / (axial * (3 * stretch * stretch - 1) / 2);
       const RodActions actions = rodActions(s.sim.scene, *s.sim.elements, s.sim.state, 1, 1);
       const RodStrains strains = rodStrains(s.sim.scene, *s.sim.elements, s.sim.state, 1, 1);
       for (int i = 0; i < edges; ++i) {
         EXPECT_NEAR(s.edge(i).norm() * edges, stretch, exact) << i;
         EXPECT_NEAR(actions.force[i][0], force, exact * axial) << i;
-        EXPECT_NEAR(s.sim.state.axial_force[i] * (energy == Energy::seed ? stretch : 1), force, exact * axial) << i; // S r, or S
+        EXPECT_NEAR(s.sim.state.axial_force[i] * (energy == Energy::seed ? stretch : 1), force, exact * axial)
+            << i; // S r, or S
       }
-      for (int v = 1; v < edges; ++v) EXPECT_NEAR(strains.twist[v], torque / s.sim.scene.rods[0].material.torsional_stiffness, exact) << v;
+      for (int v = 1; v < edges; ++v)
+        EXPECT_NEAR(strains.twist[v], torque / s.sim.scene.rods[0].material.torsional_stiffness, exact) << v;
     }
 }
 
-/// A rod too stiff to buckle: `seed` gives way at r = 1/sqrt 3, EA/(3 sqrt 3) = 0.19245 EA; `classical` only where nothing is left of it, at EA.
+/// A rod too stiff to buckle: `seed` gives way at r = 1/sqrt 3, EA/(3 sqrt 3) = 0.19245 EA; `classical` only where
+/// nothing is left of it, at EA.
 TEST(Compression, GivesWayByItsLaw) {
   auto compressed = [](Energy energy, double force) {
     Scene scene = barScene(energy, 2, 1e-3);
@@ -155,8 +168,8 @@ TEST(Compression, GivesWayByItsLaw) {
   EXPECT_FALSE(compressed(Energy::classical, 1.01).finished);
 }
 
-/// A column clamped at its foot under a dead load P on its head, EA L^2/EI = 50: it buckles at P = r pi^2/4 with P = EA r (1 - r^2)/2 (`seed`), or at
-/// P r = pi^2/4 with P = EA (1 - r).
+/// A column clamped at its foot under a dead load P on its head, EA L^2/EI = 50: it buckles at P = r pi^2/4 with P = EA
+/// r (1 - r^2)/2 (`seed`), or at P r = pi^2/4 with P = EA (1 - r).
 TEST(Column, BucklesByItsLaw) {
   const double axial = 50, slender = pi * pi / 4;
   auto critical = [&](Energy energy, int edges) {
@@ -181,7 +194,8 @@ TEST(Column, BucklesByItsLaw) {
     return found;
   };
   for (const Energy energy : {Energy::seed, Energy::classical}) {
-    const double exact_load = energy == Energy::seed ? slender * std::sqrt(1 - 2 * slender / axial) : axial / 2 * (1 - std::sqrt(1 - 4 * slender / axial));
+    const double exact_load = energy == Energy::seed ? slender * std::sqrt(1 - 2 * slender / axial)
+                                                     : axial / 2 * (1 - std::sqrt(1 - 4 * slender / axial));
     const double coarse = critical(energy, 16), fine = critical(energy, 32);
     EXPECT_NEAR(order(std::abs(coarse - exact_load), std::abs(fine - exact_load)), 2, 0.1);
     EXPECT_NEAR((4 * fine - coarse) / 3, exact_load, 1e-5 * exact_load); // terms of h^4

@@ -7,7 +7,8 @@ namespace tendril::test {
 namespace {
 
 /// All but euler.
-const std::vector<std::string> accurate{"bdf2", "bdf3", "sdirk2", "sdirk23", "sdirk33", "midpoint", "symplectic2", "generalized_alpha", "energy_momentum"};
+const std::vector<std::string> accurate{
+    "bdf2", "bdf3", "sdirk2", "sdirk23", "sdirk33", "midpoint", "symplectic2", "generalized_alpha", "energy_momentum"};
 
 int orderOf(const std::string &name) {
   IntegratorSettings settings;
@@ -33,7 +34,8 @@ struct Sharp {
   ~Sharp() { EXPECT_EQ(PetscOptionsClearValue(nullptr, "-snes_rtol"), PetscErrorCode(0)); }
 };
 
-/// A straight rod, clamped, stiffer one way than the other: bends in space, twists and stretches. \param axial EA L^2/EI
+/// A straight rod, clamped, stiffer one way than the other: bends in space, twists and stretches. \param axial EA
+/// L^2/EI
 Scene swingScene(double axial, double stiffness_damping = 0, Energy energy = Energy::seed) {
   Rod rod = straightRod(8, Measure::angle);
   rod.material.axial_stiffness = axial;
@@ -91,27 +93,34 @@ Outcome swing(const LoopSettings &settings, double axial, double stiffness_dampi
 double apart(const State &a, const State &b, bool directors = true) {
   double worst = 0;
   for (std::size_t v = 0; v < a.position.size(); ++v) worst = std::max(worst, (a.position[v] - b.position[v]).norm());
-  for (std::size_t e = 0; directors && e < a.director.size(); ++e) worst = std::max(worst, (a.director[e] - b.director[e]).norm());
+  for (std::size_t e = 0; directors && e < a.director.size(); ++e)
+    worst = std::max(worst, (a.director[e] - b.director[e]).norm());
   return worst;
 }
 
-/// Mean order over two halvings, without a reference: the differences of neighbours fall like the errors. A fifth of the slowest period.
-double observedOrder(const std::string &integrator, double dt, double axial, double stiffness_damping, bool directors, Energy energy = Energy::seed) {
+/// Mean order over two halvings, without a reference: the differences of neighbours fall like the errors. A fifth of
+/// the slowest period.
+double observedOrder(const std::string &integrator, double dt, double axial, double stiffness_damping, bool directors,
+                     Energy energy = Energy::seed) {
   State runs[4];
-  for (int k = 0; k < 4; ++k) runs[k] = swing(with(integrator, dt / (1 << k), 0.4), axial, stiffness_damping, energy).state;
+  for (int k = 0; k < 4; ++k)
+    runs[k] = swing(with(integrator, dt / (1 << k), 0.4), axial, stiffness_damping, energy).state;
   return 0.5 * order(apart(runs[0], runs[1], directors), apart(runs[2], runs[3], directors));
 }
 
-/// Positions alone: without dissipation the directors carry twist waves of every length, some too fast for the steps. Terms of the next order are
-/// less than a tenth of the error: 0.15 of the order. On a rod that is as good as inextensible the start is not smooth, for the axial force jumps to
-/// that of the swing: 0.45. Methods of third order are off the waves that they do not resolve in steps four times as long: 0.25. With bdf3 those waves grow.
+/// Positions alone: without dissipation the directors carry twist waves of every length, some too fast for the steps.
+/// Terms of the next order are less than a tenth of the error: 0.15 of the order. On a rod that is as good as
+/// inextensible the start is not smooth, for the axial force jumps to that of the swing: 0.45. Methods of third order
+/// are off the waves that they do not resolve in steps four times as long: 0.25. With bdf3 those waves grow.
 TEST(Integrator, HasItsOrder) {
   const Sharp sharp;
   EXPECT_NEAR(observedOrder("euler", 2.5e-3, 1e2, 0, false), 1, 0.1);
   EXPECT_NEAR(observedOrder("euler", 2.5e-3, 1e8, 0, false), 1, 0.1);
   for (const std::string &name : accurate) {
     if (name == "bdf3") continue;
-    EXPECT_NEAR(observedOrder(name, orderOf(name) == 2 ? 2.5e-3 : 1e-2, 1e2, 0, false), orderOf(name), orderOf(name) == 2 ? 0.15 : 0.25) << name;
+    EXPECT_NEAR(observedOrder(name, orderOf(name) == 2 ? 2.5e-3 : 1e-2, 1e2, 0, false), orderOf(name),
+                orderOf(name) == 2 ? 0.15 : 0.25)
+        << name;
     if (orderOf(name) == 2) EXPECT_NEAR(observedOrder(name, 2.5e-3, 1e2, 0, false, Energy::classical), 2, 0.15) << name;
     EXPECT_NEAR(observedOrder(name, 1e-2, 1e8, 0, true), stiffOrderOf(name, false), 0.45) << name;
   }
@@ -121,10 +130,14 @@ TEST(Integrator, HasItsOrder) {
 TEST(Integrator, KeepsItsOrderWithDissipationByStiffness) {
   const Sharp sharp;
   for (const std::string &name : accurate) {
-    EXPECT_NEAR(observedOrder(name, orderOf(name) == 2 ? 5e-3 : 1e-2, 1e2, 0.02, true), orderOf(name), 0.1) << name; // third order: errors above Newton's
+    EXPECT_NEAR(observedOrder(name, orderOf(name) == 2 ? 5e-3 : 1e-2, 1e2, 0.02, true), orderOf(name), 0.1)
+        << name; // third order: errors above Newton's
     EXPECT_NEAR(observedOrder(name, 1e-2, 1e8, 0.02, true), stiffOrderOf(name, true), 0.2) << name;
-    // Of third order sdirk23 has a small part of second order, a tenth of the error at these steps: 2.85 measured; sdirk33 2.90.
-    EXPECT_NEAR(observedOrder(name, orderOf(name) == 2 ? 5e-3 : 1e-2, 1e2, 0.02, true, Energy::classical), orderOf(name), orderOf(name) == 2 ? 0.1 : 0.2) << name;
+    // Of third order sdirk23 has a small part of second order, a tenth of the error at these steps: 2.85 measured;
+    // sdirk33 2.90.
+    EXPECT_NEAR(observedOrder(name, orderOf(name) == 2 ? 5e-3 : 1e-2, 1e2, 0.02, true, Energy::classical),
+                orderOf(name), orderOf(name) == 2 ? 0.1 : 0.2)
+        << name;
   }
 }
 
@@ -181,7 +194,9 @@ TEST(FreeFall, IsExactInSecondOrder) {
     EXPECT_PETSC(sim.setUp(scene, with(name, 1, 1)));
     const State s = patternOfSteps(sim, name, 0.01, 0.7);
     const Vec3 moved = scene.rods[0].initial_velocity * s.time + scene.gravity * (0.5 * s.time * s.time);
-    for (int v = 0; v <= 10; ++v) EXPECT_LT((s.position[v] - scene.rods[0].position[v] - moved).norm(), 1e-9) << name; // 70 steps, each to 1e-10 of the weight
+    for (int v = 0; v <= 10; ++v)
+      EXPECT_LT((s.position[v] - scene.rods[0].position[v] - moved).norm(), 1e-9)
+          << name; // 70 steps, each to 1e-10 of the weight
   }
 }
 
@@ -191,7 +206,8 @@ struct Flight {
 };
 
 /// A free rod, thrown with velocities that depend on places.
-Flight fly(const Rod &rod, const std::function<Vec3(const Vec3 &)> &thrown, const std::string &integrator, double dt, int steps) {
+Flight fly(const Rod &rod, const std::function<Vec3(const Vec3 &)> &thrown, const std::string &integrator, double dt,
+           int steps) {
   Scene scene;
   scene.gravity = Vec3::Zero();
   scene.rods = {rod};
@@ -235,7 +251,8 @@ Flight fly(const std::string &integrator, double dt, int steps, Energy energy) {
   rod.energy = energy;
   rod.material.axial_stiffness = 1e3;
   return fly(
-      rod, [](const Vec3 &x) { return Vec3(1, 4 * (x[0] - 0.5) + 6 * (std::pow(x[0] - 0.5, 2) - 1.0 / 12), 0); }, integrator, dt, steps);
+      rod, [](const Vec3 &x) { return Vec3(1, 4 * (x[0] - 0.5) + 6 * (std::pow(x[0] - 0.5, 2) - 1.0 / 12), 0); },
+      integrator, dt, steps);
 }
 
 /// A thousand steps, forty periods of the first bending mode, which a step cuts in 28.
@@ -250,7 +267,8 @@ TEST(FreeFlight, KeepsWhatEachMethodPromises) {
       EXPECT_LT(flights[name].energy_most, 1.01) << name;
     }
     for (const char *name : {"midpoint", "symplectic2"}) EXPECT_GT(flights[name].energy_least, 0.99) << name;
-    for (const char *name : {"midpoint", "symplectic2", "energy_momentum"}) EXPECT_LT(flights[name].angular, 1e-9) << name; // quadratic in the motion
+    for (const char *name : {"midpoint", "symplectic2", "energy_momentum"})
+      EXPECT_LT(flights[name].angular, 1e-9) << name; // quadratic in the motion
     EXPECT_GT(flights["energy_momentum"].energy_least, 0.99);
     EXPECT_LT(flights["euler"].energy_end, 0.8);
     EXPECT_GT(flights["generalized_alpha"].energy_end, 0.99);
@@ -261,8 +279,9 @@ TEST(FreeFlight, KeepsWhatEachMethodPromises) {
   }
 }
 
-/// A rod that is straight by nature, drawn as an arc of 60 degrees, spins at 4 rad/s in its plane and a little out of it, and vibrates strongly: 140 steps in
-/// the first period, and from 0.2 down to 0.002 in that of the stiffest motion. 71 periods; 1 % of the energy is asked for.
+/// A rod that is straight by nature, drawn as an arc of 60 degrees, spins at 4 rad/s in its plane and a little out of
+/// it, and vibrates strongly: 140 steps in the first period, and from 0.2 down to 0.002 in that of the stiffest motion.
+/// 71 periods; 1 % of the energy is asked for.
 TEST(FreeFlight, KeepsItsEnergyByEnergyMomentumHoweverStiff) {
   std::vector<Vec3> arc;
   for (int i = 0; i <= 20; ++i) arc.push_back(3 / pi * Vec3(std::cos(pi / 3 * i / 20), std::sin(pi / 3 * i / 20), 0));
@@ -274,15 +293,16 @@ TEST(FreeFlight, KeepsItsEnergyByEnergyMomentumHoweverStiff) {
   for (const double axial : {1e4, 1e6, 1e8}) {
     rod.material.axial_stiffness = axial;
     const Flight flight = fly(
-        rod, [&](const Vec3 &x) { return Vec3(Vec3(1, 0, 0) + Vec3(0.5, 0, 4).cross(x - middle)); }, "energy_momentum", 2e-3, 10000);
+        rod, [&](const Vec3 &x) { return Vec3(Vec3(1, 0, 0) + Vec3(0.5, 0, 4).cross(x - middle)); }, "energy_momentum",
+        2e-3, 10000);
     EXPECT_GT(flight.energy_least, 0.99) << axial;
     EXPECT_LT(flight.energy_most, 1.01) << axial;
     EXPECT_LT(flight.angular, 1e-6) << axial; // Newton's tolerance, 10 000 times
   }
 }
 
-/// A stiff rod that falls from a clamp, in steps far longer than its axial waves, which cross it in 3.5 ms. Largest energy but for what was there at the
-/// start, over weight times length: 1e-4 with the second solve, 6 without.
+/// A stiff rod that falls from a clamp, in steps far longer than its axial waves, which cross it in 3.5 ms. Largest
+/// energy but for what was there at the start, over weight times length: 1e-4 with the second solve, 6 without.
 TEST(FreeVibration, OfAStiffRodKeepsItsEnergyByEnergyMomentum) {
   Rod rod = straightRod(50);
   rod.material = homogeneousMaterial({SectionShape::circle, {0.005, 0}}, 1e8, 1e8 / 3, 1200);
@@ -312,8 +332,9 @@ TEST(FreeVibration, OfAStiffRodKeepsItsEnergyByEnergyMomentum) {
   }
 }
 
-/// A soft cable of two edges spins about its pinned end and swings in length by half. energy_momentum's axial force does the work that edges store when its
-/// solves have settled, to Newton's tolerance: measured 3e-9. Two solves left 2e-5, and midpoint swings by 4e-3.
+/// A soft cable of two edges spins about its pinned end and swings in length by half. energy_momentum's axial force
+/// does the work that edges store when its solves have settled, to Newton's tolerance: measured 3e-9. Two solves left
+/// 2e-5, and midpoint swings by 4e-3.
 TEST(SpringPendulum, KeepsItsEnergyByEnergyMomentum) {
   const Sharp sharp;
   auto swing = [](const std::string &name, double dt, Energy energy) {
@@ -349,7 +370,8 @@ TEST(SpringPendulum, KeepsItsEnergyByEnergyMomentum) {
   }
 }
 
-/// A clamp that travels and turns: held vertices are where and as fast as the support says, and all methods find the same motion.
+/// A clamp that travels and turns: held vertices are where and as fast as the support says, and all methods find the
+/// same motion.
 TEST(Integrator, FollowsSupportsThatMove) {
   State first;
   for (const std::string &name : accurate) {
@@ -362,7 +384,9 @@ TEST(Integrator, FollowsSupportsThatMove) {
     EXPECT_LT((sim.state.position[0] - Vec3(0.5, 1, 0)).norm(), 1e-14) << name;
     EXPECT_LT((sim.state.velocity[0] - motion.velocity).norm(), 1e-14) << name;
     if (first.twist_rate.empty()) first = sim.state;
-    for (int e = 0; e < 8; ++e) EXPECT_NEAR(sim.state.twist_rate[e], first.twist_rate[e], 0.1) << name; // of 3 pi: errors of second order at omega h = 0.1
+    for (int e = 0; e < 8; ++e)
+      EXPECT_NEAR(sim.state.twist_rate[e], first.twist_rate[e], 0.1)
+          << name; // of 3 pi: errors of second order at omega h = 0.1
     EXPECT_LT(apart(sim.state, first), 0.02) << name;
   }
 }
@@ -393,13 +417,15 @@ LoopSettings adapted(const std::string &integrator, double dt, double t_end, dou
   return settings;
 }
 
-/// The sum of the local errors bounds the error of the end up to a factor: errors turn and grow with the motion. The first step is far too long.
+/// The sum of the local errors bounds the error of the end up to a factor: errors turn and grow with the motion. The
+/// first step is far too long.
 TEST(Adaptation, MeetsItsTolerance) {
   const Sharp sharp;
   const State fine = swing(with("generalized_alpha", 2.5e-4, 0.8), 1e4, 1e-3).state;
   for (const std::string &name : integratorNames()) {
     const double rtol = name == "euler" ? 1e-2 : 1e-3;
-    const Outcome loose = swing(adapted(name, 0.1, 0.8, rtol), 1e4, 1e-3), tight = swing(adapted(name, 0.1, 0.8, rtol / 8), 1e4, 1e-3);
+    const Outcome loose = swing(adapted(name, 0.1, 0.8, rtol), 1e4, 1e-3),
+                  tight = swing(adapted(name, 0.1, 0.8, rtol / 8), 1e4, 1e-3);
     const double errors[2] = {apart(loose.state, fine), apart(tight.state, fine)};
     EXPECT_LT(errors[0], 10 * loose.estimate) << name;
     EXPECT_LT(errors[1], 10 * tight.estimate) << name;
@@ -421,10 +447,12 @@ TEST(Adaptation, LandsOnTheTimesOfFrames) {
     last = t;
   }
   for (const double t : {0.1, 0.2, 0.3, 0.35})
-    EXPECT_TRUE(std::any_of(run.times.begin(), run.times.end(), [&](double a) { return std::abs(a - t) < 1e-15; })) << t;
+    EXPECT_TRUE(std::any_of(run.times.begin(), run.times.end(), [&](double a) { return std::abs(a - t) < 1e-15; }))
+        << t;
 }
 
-/// Fixed steps that do not divide the time between frames are shortened evenly; those that do stay as they are to the last bit.
+/// Fixed steps that do not divide the time between frames are shortened evenly; those that do stay as they are to the
+/// last bit.
 TEST(FixedSteps, LandOnTheTimesOfFrames) {
   LoopSettings settings = dynamics(0.03, 0.35);
   settings.output_interval = 0.1;
@@ -442,8 +470,8 @@ TEST(FixedSteps, LandOnTheTimesOfFrames) {
   EXPECT_EQ(with[3] - with[2], 0.08 - 0.06);
 }
 
-/// Inertia turns what positions round into forces, in steps of microseconds more than -snes_rtol allows: Newton must not look for less than that. No load acts
-/// on the ring, and adapted steps begin where it starts from rest, short.
+/// Inertia turns what positions round into forces, in steps of microseconds more than -snes_rtol allows: Newton must
+/// not look for less than that. No load acts on the ring, and adapted steps begin where it starts from rest, short.
 TEST(Adaptation, TakesShortSteps) {
   const Scene ring = readScene(std::string(TENDRIL_SOURCE_DIR) + "/data/scenes/twisted_ring.yaml").scene;
   for (const std::string &name : integratorNames()) {
@@ -460,27 +488,37 @@ TEST(Adaptation, TakesShortSteps) {
       fixed.dt_min = dt / 2;
       const Outcome run = outcome(fixed);
       EXPECT_EQ(run.rejected, 0) << name << " " << dt;
-      EXPECT_LE(run.iterations, (orderOf(name) == 3 ? 6 : 4) * run.steps) << name << " " << dt; // of up to three stages, or two
+      EXPECT_LE(run.iterations, (orderOf(name) == 3 ? 6 : 4) * run.steps)
+          << name << " " << dt; // of up to three stages, or two
     }
   }
 }
 
-/// On a stiff rod Newton takes about as many iterations as on a soft one; methods whose axial forces swing from step to step, up to two and a half times as
-/// many: midpoint, symplectic2, and sdirk23, which damps them slowly; energy_momentum up to five solves instead of three.
+/// On a stiff rod Newton takes about as many iterations as on a soft one; methods whose axial forces swing from step to
+/// step, up to two and a half times as many: midpoint, symplectic2, and sdirk23, which damps them slowly;
+/// energy_momentum up to five solves instead of three.
 TEST(Integrator, IterationsDoNotGrowWithTheAxialStiffness) {
-  const std::map<std::string, double> most{{"midpoint", 2.5}, {"symplectic2", 2.5}, {"sdirk23", 2.5}, {"energy_momentum", 2}};
+  const std::map<std::string, double> most{
+      {"midpoint", 2.5}, {"symplectic2", 2.5}, {"sdirk23", 2.5}, {"energy_momentum", 2}};
   for (const std::string &name : integratorNames())
     for (const double axial : {1e8, 1e12})
-      EXPECT_LE(swing(with(name, 0.01, 0.4), axial).iterations, (most.count(name) ? most.at(name) : 1.2) * swing(with(name, 0.01, 0.4), 1e4).iterations)
+      EXPECT_LE(swing(with(name, 0.01, 0.4), axial).iterations,
+                (most.count(name) ? most.at(name) : 1.2) * swing(with(name, 0.01, 0.4), 1e4).iterations)
           << name << " " << axial;
 }
 
-/// The released cantilever against a Legendre-Galerkin solution (data/reference), at 5 ms: the figures are those measured with 50 edges, with a margin of a
-/// half.
+/// The released cantilever against a Legendre-Galerkin solution (data/reference), at 5 ms: the figures are those
+/// measured with 50 edges, with a margin of a half.
 TEST(Integrator, FollowsTheReleasedCantilever) {
-  const std::map<std::string, double> largest{
-      {"euler", 0.1},     {"bdf2", 8e-3},        {"sdirk2", 5e-3},          {"sdirk23", 5e-3},          {"sdirk33", 5e-3},
-      {"midpoint", 5e-3}, {"symplectic2", 5e-3}, {"energy_momentum", 5e-3}, {"generalized_alpha", 5e-3}};
+  const std::map<std::string, double> largest{{"euler", 0.1},
+                                              {"bdf2", 8e-3},
+                                              {"sdirk2", 5e-3},
+                                              {"sdirk23", 5e-3},
+                                              {"sdirk33", 5e-3},
+                                              {"midpoint", 5e-3},
+                                              {"symplectic2", 5e-3},
+                                              {"energy_momentum", 5e-3},
+                                              {"generalized_alpha", 5e-3}};
   Rod rod = straightRod(50);
   rod.material = homogeneousMaterial({SectionShape::circle, {0.005, 0}}, 1e7, 1e7 / 3, 1200);
   for (const auto &[name, bound] : largest) {

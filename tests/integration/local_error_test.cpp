@@ -79,7 +79,8 @@ double ratio(const std::string &integrator, double time, double h, double growth
 }
 
 /// The next order in h is some hundredths; that of bdf2 without growth a tenth, for the step before has left its own
-/// error in the memory. sdirk33 is off by a third of its estimate where x'''' is that of turning, not of a linear motion.
+/// error in the memory. sdirk33 is off by a third of its estimate where x'''' is that of turning, not of a linear
+/// motion.
 TEST(LocalError, IsThatOfTheEstimate) {
   EXPECT_EQ(PetscOptionsSetValue(nullptr, "-snes_rtol", "1e-11"), PetscErrorCode(0));
   for (const std::string &name : integratorNames())

@@ -128,10 +128,12 @@ TEST(Buckling, AxialForceWhereEndsArePushedTogetherIsEulersLoad) {
   const struct {
     const char *id;
     Support::Kind first, last;
-  } cases[] = {{"euler_pinned_pinned", pin, pin}, {"euler_clamped_pinned", clamp, pin}, {"euler_clamped_clamped", clamp, clamp}};
+  } cases[] = {
+      {"euler_pinned_pinned", pin, pin}, {"euler_clamped_pinned", clamp, pin}, {"euler_clamped_clamped", clamp, clamp}};
   for (const auto &c : cases) {
     const double exact = criticalLoad(c.id);
-    const double coarse = std::abs(shorteningLoad(32, c.first, c.last) - exact), fine = std::abs(shorteningLoad(64, c.first, c.last) - exact);
+    const double coarse = std::abs(shorteningLoad(32, c.first, c.last) - exact),
+                 fine = std::abs(shorteningLoad(64, c.first, c.last) - exact);
     EXPECT_NEAR(order(coarse, fine), 2, order_tolerance) << c.id;
     EXPECT_LT(fine, load_tolerance * exact) << c.id;
   }
@@ -181,7 +183,8 @@ TEST(ArcLength, LeavesSmallBendingOfFineRodsRight) {
     ASSERT_EQ(path.end.time, 1);
     EXPECT_NEAR(path.end.position.back().y() / -1e-6, 1 + 0.5 / edges / edges, 1e-5) << edges;
     EXPECT_GT(path.rounding_error[0], 0) << edges;
-    EXPECT_LT(*std::max_element(path.rounding_error.begin(), path.rounding_error.end()), 1e-9) << edges; // 1e-3 of what the load moves
+    EXPECT_LT(*std::max_element(path.rounding_error.begin(), path.rounding_error.end()), 1e-9)
+        << edges; // 1e-3 of what the load moves
   }
 }
 
@@ -197,8 +200,8 @@ Rod arcRod(int edges, double radius, double half, Measure measure) {
   return rod;
 }
 
-/// Deep circular arch of 215 degrees, clamped at one end and hinged at the other, pushed down at the crown: DaDeppo & Schmidt (1975).
-/// Stiff out of its plane, for the path lies in it.
+/// Deep circular arch of 215 degrees, clamped at one end and hinged at the other, pushed down at the crown: DaDeppo &
+/// Schmidt (1975). Stiff out of its plane, for the path lies in it.
 Scene deepArch(int edges, double load, Measure measure = Measure::angle) {
   Rod rod = arcRod(edges, 100, 107.5 * pi / 180, measure);
   rod.material = {1, 1e-6, 1e8, 1e9, {1e6, 1e9}, 0, 0};
@@ -224,7 +227,8 @@ TEST(ArcLength, LimitLoadOfTheDeepArchIsSecondOrder) {
   const double exact = 8.97 * 1e6 / 1e4, load = limitLoad(64, 20);
   EXPECT_NEAR(load, exact, 0.01 * exact); // the reference has three digits
   EXPECT_NEAR(order(load - limitLoad(32, 20), limitLoad(128, 20) - load), 2, order_tolerance);
-  EXPECT_NEAR(limitLoad(64, 80), load, 1e-6 * load); // a point of the path, however the steps fall: to the solver's 1e-6 of the load
+  EXPECT_NEAR(limitLoad(64, 80), load,
+              1e-6 * load); // a point of the path, however the steps fall: to the solver's 1e-6 of the load
 }
 
 TEST(ArcLength, DoesNotTurnBackAtASharpLimitPoint) {
@@ -242,7 +246,8 @@ TEST(ArcLength, LoadFallsAndOnePivotIsNegativeBehindTheLimitPoint) {
   ASSERT_EQ(path.critical.size(), 1u);
   EXPECT_EQ(path.factor.size(), 24u);
   EXPECT_LT(path.end.time, 0.8 * path.critical[0].load_factor);
-  const auto across = std::size_t(std::find(path.negative.begin(), path.negative.end(), 1) - path.negative.begin()); // the step with the limit point in it
+  const auto across = std::size_t(std::find(path.negative.begin(), path.negative.end(), 1) -
+                                  path.negative.begin()); // the step with the limit point in it
   ASSERT_GT(across, 2u);
   ASSERT_LT(across, path.factor.size() - 2);
   EXPECT_LT(path.factor[across], path.critical[0].load_factor);
@@ -258,7 +263,8 @@ TEST(ArcLength, RollsTheRodIntoACircleByACouple) {
   scene.moments = {{0, 31, 0, Vec3(0, 0, 2 * pi)}};
   const Path path = follow(scene, along(4, 200));
   EXPECT_EQ(path.end.time, 1);
-  EXPECT_LT(path.end.position.back().norm(), 1e-6); // every vertex turns by exactly 2 pi/n; the solver's 1e-6 of the load
+  EXPECT_LT(path.end.position.back().norm(),
+            1e-6); // every vertex turns by exactly 2 pi/n; the solver's 1e-6 of the load
 }
 
 TEST(ArcLength, FailureKeepsTheStateAndSaysWhy) {
@@ -298,9 +304,12 @@ TEST(ArcLength, RefusesPrescribedMotionsAndScenesWithoutLoad) {
 
 constexpr double step_tolerance = 1e-7; // what two ways to a critical factor may differ by: asked for
 
-Scene sceneOf(const std::string &file) { return readScene(std::string(TENDRIL_SOURCE_DIR) + "/data/scenes/" + file).scene; }
+Scene sceneOf(const std::string &file) {
+  return readScene(std::string(TENDRIL_SOURCE_DIR) + "/data/scenes/" + file).scene;
+}
 
-/// The linear equations of the discrete column, half cell at its foot, have the solution sin(w (i + 1/2)) with w = pi/(2 n).
+/// The linear equations of the discrete column, half cell at its foot, have the solution sin(w (i + 1/2)) with w =
+/// pi/(2 n).
 double discreteEulerLoad(int edges) { return 2.0 * edges * edges * (1 - std::cos(pi / (2 * edges))); }
 
 TEST(CriticalFactor, OfAColumnIsOneWhateverTheSteps) {
@@ -310,7 +319,8 @@ TEST(CriticalFactor, OfAColumnIsOneWhateverTheSteps) {
     const Path path = follow(scene, statics(steps));
     ASSERT_EQ(path.critical.size(), 1u) << steps;
     EXPECT_FALSE(path.critical[0].limit) << steps;
-    EXPECT_NEAR(path.critical[0].load_factor, exact, step_tolerance * exact) << steps; // F/EA = 2.5e-8 of it is not in the exact value
+    EXPECT_NEAR(path.critical[0].load_factor, exact, step_tolerance * exact)
+        << steps; // F/EA = 2.5e-8 of it is not in the exact value
   }
 }
 
@@ -333,7 +343,8 @@ TEST(CriticalFactor, OfAHeavyColumnIsOneWhateverTheSteps) {
 /// A rod that hangs out from an axis about which it turns may stand anywhere around it.
 TEST(CriticalFactor, IsNoneWhereAMotionCostsNothing) {
   const Scene scene = sceneOf("verify/conical.yaml");
-  for (const int steps : {1, 2, 3, 5, 7, 10, 20, 40, 80, 160}) EXPECT_TRUE(follow(scene, statics(steps)).critical.empty()) << steps;
+  for (const int steps : {1, 2, 3, 5, 7, 10, 20, 40, 80, 160})
+    EXPECT_TRUE(follow(scene, statics(steps)).critical.empty()) << steps;
 }
 
 TEST(CriticalFactor, AlongTheArcLengthIsThatOfLoadSteps) {
@@ -370,14 +381,17 @@ TEST(CriticalFactor, OfTwoRodsAreBothFoundWhateverTheSteps) {
   scene.forces.push_back(scene.forces[0]);
   scene.forces.back().rod = 1;
   const double exact = discreteEulerLoad(64) / (pi * pi);
-  for (const LoopSettings &settings : {statics(1), statics(2), statics(5), statics(7), statics(40), along(3, 200), along(40, 200)}) {
+  for (const LoopSettings &settings :
+       {statics(1), statics(2), statics(5), statics(7), statics(40), along(3, 200), along(40, 200)}) {
     const Path path = follow(scene, settings);
     ASSERT_EQ(path.critical.size(), 2u) << settings.dt;
-    for (int r = 0; r < 2; ++r) EXPECT_NEAR(path.critical[r].load_factor, (r == 0 ? 1 : 1.05) * exact, 3e-6) << settings.dt; // F/EA = 2.5e-6
+    for (int r = 0; r < 2; ++r)
+      EXPECT_NEAR(path.critical[r].load_factor, (r == 0 ? 1 : 1.05) * exact, 3e-6) << settings.dt; // F/EA = 2.5e-6
   }
 }
 
-/// A round column between clamps buckles in any plane, and may turn its plane at no cost. Just past the critical load that turn looks unstable.
+/// A round column between clamps buckles in any plane, and may turn its plane at no cost. Just past the critical load
+/// that turn looks unstable.
 TEST(CriticalFactor, OfAShortenedRoundColumnIsOneWhateverTheSteps) {
   Scene scene;
   scene.gravity.setZero();
@@ -400,13 +414,15 @@ TEST(CriticalFactor, OfAShortenedRoundColumnIsOneWhateverTheSteps) {
   }
 }
 
-/// The end of a rod comes back to where it was: its stiffness grows without bound, and Newton fails there. That is no critical load.
+/// The end of a rod comes back to where it was: its stiffness grows without bound, and Newton fails there. That is no
+/// critical load.
 TEST(CriticalFactor, IsNoneWhereNewtonOnlyFails) {
   const Scene scene = sceneOf("verify/tangent_loop.yaml");
   for (const int steps : {1, 2, 5, 20, 36}) EXPECT_TRUE(follow(scene, statics(steps)).critical.empty()) << steps;
 }
 
-/// The other branch of an imperfect column turns back near the critical load of the perfect one. The way from the start does not lead there.
+/// The other branch of an imperfect column turns back near the critical load of the perfect one. The way from the start
+/// does not lead there.
 TEST(CriticalFactor, IsNoneOfAnImperfectColumn) {
   for (const double aside : {1e-5, 1e-4})
     for (const double stiffer : {1.0, 1.3}) {
@@ -414,7 +430,8 @@ TEST(CriticalFactor, IsNoneOfAnImperfectColumn) {
       scene.rods[0].material.flexural_stiffness = {1, stiffer};
       scene.rods[0].material.axial_stiffness = 1e5;
       scene.forces[0].force += Vec3(0, aside, 2 * aside);
-      for (const int steps : {1, 3, 10, 20}) EXPECT_TRUE(follow(scene, statics(steps)).critical.empty()) << aside << " " << stiffer << " " << steps;
+      for (const int steps : {1, 3, 10, 20})
+        EXPECT_TRUE(follow(scene, statics(steps)).critical.empty()) << aside << " " << stiffer << " " << steps;
     }
 }
 
@@ -426,7 +443,9 @@ TEST(ArcLength, RefusesARodThatIsFreeToSwingWithoutLoads) {
   ASSERT_EQ(sim.setUp(scene, along(10, 20)), PetscErrorCode(0));
   ArcLength loop(sim.solver, along(10, 20));
   bool finished = true;
-  ASSERT_EQ(loop.run(sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished), PetscErrorCode(0));
+  ASSERT_EQ(loop.run(
+                sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished),
+            PetscErrorCode(0));
   EXPECT_FALSE(finished);
   EXPECT_NE(loop.failure().find("without loads a rod is free to move"), std::string::npos) << loop.failure();
 }
@@ -443,7 +462,8 @@ TEST(CriticalFactor, OfALimitPointIsThatOfTheArcLength) {
   }
 }
 
-/// A clamped column of length 1 is half of a pinned one of length 2: load P/4, tip at (1 - shortening, 2 ymax) of elastica_postbuckling.csv.
+/// A clamped column of length 1 is half of a pinned one of length 2: load P/4, tip at (1 - shortening, 2 ymax) of
+/// elastica_postbuckling.csv.
 double buckledTipError(int edges, double slope, LoopSettings settings) {
   auto exact = referenceRow("elastica_postbuckling.csv", slope);
   settings.bifurcation = Bifurcation::switch_branch;
@@ -489,7 +509,8 @@ TEST(SwitchedBranch, OfADeepArchSways) {
     ASSERT_EQ(path.critical.size(), 1u);
     EXPECT_FALSE(path.critical[0].limit);
     load[k] = path.critical[0].load_factor;
-    EXPECT_LT(std::abs(path.end.position[16 << k].x()), 1e-3 * radius); // where the mode costs nothing, rounding moves along it
+    EXPECT_LT(std::abs(path.end.position[16 << k].x()),
+              1e-3 * radius); // where the mode costs nothing, rounding moves along it
     EXPECT_NEAR(criticalFactor(scene, 20), load[k], step_tolerance * load[k]);
   }
   EXPECT_NEAR(order(load[1] - load[0], load[2] - load[1]), 2, order_tolerance);
@@ -499,21 +520,24 @@ TEST(SwitchedBranch, OfADeepArchSways) {
   ASSERT_EQ(path.critical.size(), 1u);
   ASSERT_EQ(path.end.time, 1);
   EXPECT_GT(sway(path.end), 0.2 * radius);
-  const auto first =
-      std::size_t(std::find_if(path.states.begin(), path.states.end(), [&](const State &s) { return sway(s) > 1e-3 * radius; }) - path.states.begin());
+  const auto first = std::size_t(
+      std::find_if(path.states.begin(), path.states.end(), [&](const State &s) { return sway(s) > 1e-3 * radius; }) -
+      path.states.begin());
   ASSERT_LT(first + 2, path.states.size());
   const double ratio = (path.factor[first + 2] - load[0]) / (path.factor[first + 1] - load[0]);
-  EXPECT_NEAR(ratio, std::pow(sway(path.states[first + 2]) / sway(path.states[first + 1]), 2), 0.02 * ratio); // sways of 0.03 and 0.06 of the radius
+  EXPECT_NEAR(ratio, std::pow(sway(path.states[first + 2]) / sway(path.states[first + 1]), 2),
+              0.02 * ratio); // sways of 0.03 and 0.06 of the radius
   settings = statics(20);
   settings.bifurcation = Bifurcation::switch_branch;
   const Path load_steps = follow(symmetricArch(32), settings);
   EXPECT_EQ(load_steps.critical.size(), 1u);
-  EXPECT_NEAR(sway(load_steps.end), sway(path.end), 1e-4 * radius); // Newton's 1e-6 of the load, over the little by which the load rises
+  EXPECT_NEAR(sway(load_steps.end), sway(path.end),
+              1e-4 * radius); // Newton's 1e-6 of the load, over the little by which the load rises
   EXPECT_NEAR(load_steps.end.position[16].y(), path.end.position[16].y(), 1e-4 * radius);
 }
 
-/// Half a circle between pins, pushed together at its quarters along the line through them, about which it turns as it likes: no critical load and no mode to
-/// follow. A round one leaves its plane.
+/// Half a circle between pins, pushed together at its quarters along the line through them, about which it turns as it
+/// likes: no critical load and no mode to follow. A round one leaves its plane.
 TEST(SwitchedBranch, IsThatOfTheCriticalModeWhereAnotherMotionCostsNothing) {
   constexpr int edges = 32;
   Rod rod = arcRod(edges, 1, pi / 2, Measure::angle);
@@ -535,7 +559,8 @@ TEST(SwitchedBranch, IsThatOfTheCriticalModeWhereAnotherMotionCostsNothing) {
     ASSERT_EQ(path.end.time, 1);
     EXPECT_EQ(path.negative.back(), 0); // it leaves to the side that lowers its energy
     factor[arclength] = path.critical[0].load_factor;
-    // Its points lie in no plane through the line, whatever it has turned by: the two moments of their places across it.
+    // Its points lie in no plane through the line, whatever it has turned by: the two moments of their places across
+    // it.
     Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
     for (const Vec3 &x : path.end.position) moments += x.tail<2>() * x.tail<2>().transpose();
     across[arclength] = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(moments).eigenvalues()[0];
@@ -545,7 +570,8 @@ TEST(SwitchedBranch, IsThatOfTheCriticalModeWhereAnotherMotionCostsNothing) {
   EXPECT_NEAR(across[1], across[0], 1e-5); // the same shape, each to Newton's 1e-6 of the load
 }
 
-/// A column between pins, pushed down in its middle: half of it buckles, but it cannot get shorter, so that the load rises steeply.
+/// A column between pins, pushed down in its middle: half of it buckles, but it cannot get shorter, so that the load
+/// rises steeply.
 TEST(SwitchedBranch, MayRiseSteeply) {
   constexpr int edges = 32;
   Scene scene = clampedScene(straightRod(edges));
@@ -587,8 +613,8 @@ TEST(CriticalFactor, IsFoundInTheFirstLoadStep) {
   EXPECT_EQ(none.end.time, 1);
 }
 
-/// Lee's frame: two members of length 120, joined rigidly and hinged at their ends, pushed down 24 from the corner (data/reference/frames_lee.csv). As one
-/// polyline; without `held` it may turn about the line through its hinges.
+/// Lee's frame: two members of length 120, joined rigidly and hinged at their ends, pushed down 24 from the corner
+/// (data/reference/frames_lee.csv). As one polyline; without `held` it may turn about the line through its hinges.
 struct LeeFrame {
   static constexpr double load = 2, member = 120;
   int edges;
@@ -622,7 +648,8 @@ struct LeeFrame {
     std::vector<CriticalPoint> limits;
     for (const CriticalPoint &point : path.critical) {
       if (point.limit) limits.push_back(point);
-      EXPECT_GT(std::abs(point.load_factor), 1e-2); // at no load the frame turns about its hinges: that is no critical load
+      EXPECT_GT(std::abs(point.load_factor),
+                1e-2); // at no load the frame turns about its hinges: that is no critical load
     }
     EXPECT_EQ(limits.size(), 2u);
     limits.resize(2);
@@ -643,12 +670,16 @@ TEST(LeeFrame, LimitLoadsAreSecondOrder) {
     const double exact = LeeFrame::reference(k == 0 ? "lin,limit1" : "lin,limit2");
     std::array<double, 4> limit{};
     for (int i = 0; i < 4; ++i) limit[i] = LeeFrame::load * LeeFrame{20 << i}.limits()[k].load_factor;
-    for (int i = 0; i < 3; ++i) EXPECT_NEAR(order(limit[i] - exact, limit[i + 1] - exact), 2, 0.03) << k << " at " << (20 << i); // 0.02 at 20 edges
-    EXPECT_NEAR((4 * limit[3] - limit[2]) / 3, exact, 1e-6 * std::abs(exact)) << k; // what is left of the fourth order and of the flat load there
+    for (int i = 0; i < 3; ++i)
+      EXPECT_NEAR(order(limit[i] - exact, limit[i + 1] - exact), 2, 0.03)
+          << k << " at " << (20 << i); // 0.02 at 20 edges
+    EXPECT_NEAR((4 * limit[3] - limit[2]) / 3, exact, 1e-6 * std::abs(exact))
+        << k; // what is left of the fourth order and of the flat load there
   }
 }
 
-/// Second order, 3.87/n^2; with `energy: seed` less by what the axial strain P/EA and the softness of the corner turn it, theta P/EA + theta^2 EI/(2 EA h L).
+/// Second order, 3.87/n^2; with `energy: seed` less by what the axial strain P/EA and the softness of the corner turn
+/// it, theta P/EA + theta^2 EI/(2 EA h L).
 TEST(LeeFrame, PassesTheLimitPointsAtAnyNumberOfEdges) {
   const double exact = LeeFrame::reference("lin,limit1"), theta = pi / 2;
   for (int edges = 20; edges <= 160; edges += 10)
@@ -670,19 +701,22 @@ TEST(LeeFrame, CornersOfSeedOpenByStretch) {
   std::array<double, 2> less{};
   for (const int k : {0, 1}) {
     const double stiff = k == 0 ? 4320 : 432000;
-    less[k] = LeeFrame{160, Energy::classical, true, stiff}.limits()[0].load_factor - LeeFrame{160, Energy::seed, true, stiff}.limits()[0].load_factor;
+    less[k] = LeeFrame{160, Energy::classical, true, stiff}.limits()[0].load_factor -
+              LeeFrame{160, Energy::seed, true, stiff}.limits()[0].load_factor;
   }
   EXPECT_NEAR(less[0] / less[1], 100, 1); // linear in 1/EA, but for the square of 1e-3
 }
 
 TEST(LeeFrame, PathDoesNotDependOnPlaceAndDirection) {
-  const std::array<Vec3, 5> axes{Vec3(1, 2, 3), Vec3(-3, 1, 0.5), Vec3(0.2, -0.1, 2), Vec3(1, 1, 0), Vec3(0, 4, -1)}; // rotation vectors
+  const std::array<Vec3, 5> axes{Vec3(1, 2, 3), Vec3(-3, 1, 0.5), Vec3(0.2, -0.1, 2), Vec3(1, 1, 0),
+                                 Vec3(0, 4, -1)}; // rotation vectors
   for (const bool held : {true, false})
     for (const int edges : {40, 80}) {
       const LeeFrame frame{edges, Energy::classical, held};
       const Path path = follow(frame.scene(), along(20, 200));
       for (const Vec3 &axis : axes) {
-        SCOPED_TRACE(testing::Message() << edges << " edges, turned by " << axis.transpose() << (held ? ", held in its plane" : ""));
+        SCOPED_TRACE(testing::Message() << edges << " edges, turned by " << axis.transpose()
+                                        << (held ? ", held in its plane" : ""));
         const Mat3 turn = Eigen::AngleAxisd(axis.norm(), axis.normalized()).toRotationMatrix();
         const Vec3 place = 300 * Vec3(axis.z(), axis.x(), -axis.y());
         const Path turned = follow(frame.scene(turn, place), along(20, 200));
@@ -698,10 +732,12 @@ TEST(LeeFrame, PathDoesNotDependOnPlaceAndDirection) {
     }
 }
 
-/// A free ring of a naturally straight round rod with `turns` turns of twist: is the plane circle unstable? The polygon is in equilibrium by
-/// symmetry. A little mass (a step far longer than any period) lifts the seven motions that cost nothing above zero.
+/// A free ring of a naturally straight round rod with `turns` turns of twist: is the plane circle unstable? The polygon
+/// is in equilibrium by symmetry. A little mass (a step far longer than any period) lifts the seven motions that cost
+/// nothing above zero.
 bool ringIsUnstable(int edges, int turns, double torsional) {
-  Rod rod = inextensibleRod(ringShape(Vec3::Zero(), Vec3::UnitZ(), 0.5 / (edges * std::sin(pi / edges)), edges).points, Measure::angle);
+  Rod rod = inextensibleRod(ringShape(Vec3::Zero(), Vec3::UnitZ(), 0.5 / (edges * std::sin(pi / edges)), edges).points,
+                            Measure::angle);
   rod.closed = true;
   rod.natural = Rod::Natural::given; // straight
   rod.initial_turns = turns;
@@ -724,7 +760,8 @@ bool ringIsUnstable(int edges, int turns, double torsional) {
   return negative != 0;
 }
 
-/// Michell's ring: unstable beyond a total twist of 2 pi sqrt(3) B/C. The twist of a closed ring comes in whole turns, so C is what is varied.
+/// Michell's ring: unstable beyond a total twist of 2 pi sqrt(3) B/C. The twist of a closed ring comes in whole turns,
+/// so C is what is varied.
 TEST(MichellRing, CriticalTwistIsSecondOrder) {
   for (const int turns : {1, 2, 3}) {
     std::vector<double> error;

@@ -4,7 +4,8 @@
 namespace tendril::test {
 namespace {
 
-/// A rod of unit length and density, EA 100, turning in its plane about the end that is pinned: r(1) = tan(b)/b with b = Omega/sqrt(EA).
+/// A rod of unit length and density, EA 100, turning in its plane about the end that is pinned: r(1) = tan(b)/b with b
+/// = Omega/sqrt(EA).
 double tipRadius(int edges, double omega) {
   Rod rod = straightRod(edges);
   rod.material.axial_stiffness = 100;
@@ -16,14 +17,16 @@ double tipRadius(int edges, double omega) {
   return sim.state.position.back().x();
 }
 
-/// Lumped masses and the Green-Lagrange strain make the discrete rod tend to another law of stretching than the linear one of the closed form:
-/// its fine limit, tan(b)/b + O(strain^2), is told from it by Richardson, the order by three resolutions.
+/// Lumped masses and the Green-Lagrange strain make the discrete rod tend to another law of stretching than the linear
+/// one of the closed form: its fine limit, tan(b)/b + O(strain^2), is told from it by Richardson, the order by three
+/// resolutions.
 TEST(Rotation, OfARodAboutItsEndIsSecondOrder) {
   const double omega = 1, closed = std::tan(omega / 10) / (omega / 10);
   const double coarse = tipRadius(16, omega), middle = tipRadius(32, omega), fine = tipRadius(64, omega);
   EXPECT_NEAR(order(std::abs(coarse - middle), std::abs(middle - fine)), 2, 0.1);
   const double limit = fine + (fine - middle) / 3;
-  EXPECT_NEAR(limit, closed, 3 * (closed - 1) * (closed - 1)); // strains of 3e-3 to 5e-3: the laws differ by 3/2 of their square
+  EXPECT_NEAR(limit, closed,
+              3 * (closed - 1) * (closed - 1)); // strains of 3e-3 to 5e-3: the laws differ by 3/2 of their square
 }
 
 /// A centrifugal force is that of its potential: turning about a far centre is a uniform gravity.
@@ -36,7 +39,8 @@ TEST(Rotation, AboutAFarCentreIsGravity) {
   Simulation a, b;
   runTo(a, turning, statics());
   runTo(b, heavy, statics());
-  for (std::size_t v = 0; v < a.state.position.size(); ++v) EXPECT_LT((a.state.position[v] - b.state.position[v]).norm(), 3e-6); // the field varies by 1e-6
+  for (std::size_t v = 0; v < a.state.position.size(); ++v)
+    EXPECT_LT((a.state.position[v] - b.state.position[v]).norm(), 3e-6); // the field varies by 1e-6
 }
 
 /// The potential of the centrifugal force counts as gravity, -1/2 m |omega x (x - centre)|^2.

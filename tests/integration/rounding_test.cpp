@@ -62,15 +62,18 @@ Scene steelRod(int edges, bool clamped) {
   return scene;
 }
 
-/// The tip of a cantilever to 1e-4 whatever the edges, from loads that bend it by 1e-8 of its length to those that bend it by a third.
+/// The tip of a cantilever to 1e-4 whatever the edges, from loads that bend it by 1e-8 of its length to those that bend
+/// it by a third.
 TEST(Rounding, LeavesTheTipOfACantileverRightAtEveryResolution) {
   for (const int edges : {100, 1000, 10000, 100000}) {
-    // F L^3/(3 EI) where it is small; 0.0989908 for F L^2/EI = 0.3 is the elastica's (Richardson from 64 and 128 edges). Both with the discrete beam's
-    // 1 + 1/(2 n^2).
-    for (const auto &[force, tip] : {std::pair(3e-8, 1e-8), std::pair(3e-6, 1e-6), std::pair(3e-4, 1e-4), std::pair(0.3, 0.0989908)}) {
+    // F L^3/(3 EI) where it is small; 0.0989908 for F L^2/EI = 0.3 is the elastica's (Richardson from 64 and 128
+    // edges). Both with the discrete beam's 1 + 1/(2 n^2).
+    for (const auto &[force, tip] :
+         {std::pair(3e-8, 1e-8), std::pair(3e-6, 1e-6), std::pair(3e-4, 1e-4), std::pair(0.3, 0.0989908)}) {
       const Outcome out = run(cantilever(even(edges), Vec3(0, force, 0)), statics());
       ASSERT_TRUE(out.finished) << out.failure;
-      EXPECT_NEAR(out.state.position.back().y() / tip, 1 + 0.5 / edges / edges, 1e-5) << edges << " edges, force " << force;
+      EXPECT_NEAR(out.state.position.back().y() / tip, 1 + 0.5 / edges / edges, 1e-5)
+          << edges << " edges, force " << force;
       EXPECT_GT(out.rounding_error, 0); // told for every static answer
       EXPECT_LT(out.rounding_error, 1e-3 * tip) << edges << " edges, force " << force;
       EXPECT_LE(out.iterations, 5) << edges << " edges, force " << force; // Newton's own, none spent on rounding
@@ -91,11 +94,13 @@ TEST(Rounding, LetsSteelRodsFallAtEveryResolution) {
   }
 }
 
-/// A ring clamped at one vertex and pulled at the opposite one, in both modes. Values at 1000 and more edges agree to 1e-5 (order 2).
+/// A ring clamped at one vertex and pulled at the opposite one, in both modes. Values at 1000 and more edges agree to
+/// 1e-5 (order 2).
 TEST(Rounding, LeavesRingsRightAtEveryResolution) {
   for (const int edges : {1000, 10000, 100000}) {
     std::vector<Vec3> points;
-    for (int i = 0; i < edges; ++i) points.emplace_back(0.5 * std::cos(2 * pi * i / edges), 0.5 * std::sin(2 * pi * i / edges), 0);
+    for (int i = 0; i < edges; ++i)
+      points.emplace_back(0.5 * std::cos(2 * pi * i / edges), 0.5 * std::sin(2 * pi * i / edges), 0);
     Rod ring = inextensibleRod(points);
     ring.closed = true;
     setBishopDirectors(ring);
@@ -113,7 +118,8 @@ TEST(Rounding, LeavesRingsRightAtEveryResolution) {
   }
 }
 
-/// A step load lets a cantilever swing to nearly twice its static deflection, with every integrator the same on 64 and on 4096 edges.
+/// A step load lets a cantilever swing to nearly twice its static deflection, with every integrator the same on 64 and
+/// on 4096 edges.
 TEST(Rounding, LeavesTheSwingAfterAStepLoadAlone) {
   for (const std::string &name : integratorNames()) {
     if (name == "bdf3") continue; // waves that nothing damps grow, others on other meshes
@@ -136,13 +142,15 @@ TEST(Rounding, LeavesTheSwingAfterAStepLoadAlone) {
       EXPECT_TRUE(finished) << name << loop.failure();
       amplitude.push_back(highest);
     }
-    EXPECT_NEAR(amplitude[0], amplitude[1], 1e-3) << name; // 64 edges are 1/(2 n^2) softer, and damp axial waves otherwise
+    EXPECT_NEAR(amplitude[0], amplitude[1], 1e-3)
+        << name; // 64 edges are 1/(2 n^2) softer, and damp axial waves otherwise
     EXPECT_GT(amplitude[1], 1.9) << name;
     EXPECT_LT(amplitude[1], 2.0) << name;
   }
 }
 
-/// Edges that shrink and grow by up to a million to one: the answer's error is that of its longest edges, as with twice as many.
+/// Edges that shrink and grow by up to a million to one: the answer's error is that of its longest edges, as with twice
+/// as many.
 TEST(Rounding, LeavesGradedEdgesToTheirOrder) {
   for (const double ratio : {1e3, 1e4, 1e6}) {
     auto tip = [&](int edges) {
@@ -165,7 +173,8 @@ TEST(Rounding, LeavesSliversHarmless) {
   std::vector<double> s = even(40);
   s.insert(s.begin() + 21, 0.50001);
   const Vec3 force(0, 0.3, 0);
-  const Vec3 with = run(cantilever(s, force), statics()).state.position.back(), without = run(cantilever(even(40), force), statics()).state.position.back();
+  const Vec3 with = run(cantilever(s, force), statics()).state.position.back(),
+             without = run(cantilever(even(40), force), statics()).state.position.back();
   EXPECT_LT((with - without).norm(), 1e-5); // the sliver's cells are a little shorter
   std::vector<double> long_edges = even(10, 10);
   long_edges.insert(long_edges.begin() + 6, {5 + 1e-6, 5 + 2e-6});
@@ -174,8 +183,8 @@ TEST(Rounding, LeavesSliversHarmless) {
   EXPECT_NEAR(two.state.position.back().y(), 1e-4 * 1000 / 3, 0.01 * 1e-4 * 1000 / 3); // ten edges are 0.5 % off
 }
 
-/// Bending about the soft axis does not feel how stiff the other is. F L^3/(3 EI) for a small force; 0.7137915 for F L^2/EI = 5 is the elastica's
-/// (elastica_tip_load.csv). The discrete beam is 1/(2 n^2) softer.
+/// Bending about the soft axis does not feel how stiff the other is. F L^3/(3 EI) for a small force; 0.7137915 for F
+/// L^2/EI = 5 is the elastica's (elastica_tip_load.csv). The discrete beam is 1/(2 n^2) softer.
 TEST(Rounding, LeavesTheSoftDirectionOfRibbonsRight) {
   for (const double ratio : {1e5, 1e6, 1e8, 1e10, 1e12})
     for (const int edges : {64, 128, 256})
@@ -188,7 +197,8 @@ TEST(Rounding, LeavesTheSoftDirectionOfRibbonsRight) {
         scene.supports = {hold(scene, 0, 0, Support::Kind::clamp)};
         const Outcome out = run(scene, statics());
         ASSERT_TRUE(out.finished) << out.failure;
-        EXPECT_NEAR(out.state.position.back().y(), tip, 1.3e-4 * tip * std::pow(64.0 / edges, 2)) << ratio << ", " << edges << " edges";
+        EXPECT_NEAR(out.state.position.back().y(), tip, 1.3e-4 * tip * std::pow(64.0 / edges, 2))
+            << ratio << ", " << edges << " edges";
       }
 }
 
@@ -210,10 +220,12 @@ TEST(Rounding, DoesNotDependOnTheOrigin) {
       EXPECT_LT(ends.back().y(), -1e-6);
     }
   }
-  for (const int k : {0, 1, 2}) EXPECT_LT((ends[k] - ends[k + 3]).norm(), 1e-9); // the answers' own rounding to coordinates is 1e-10
+  for (const int k : {0, 1, 2})
+    EXPECT_LT((ends[k] - ends[k + 3]).norm(), 1e-9); // the answers' own rounding to coordinates is 1e-10
 }
 
-/// A rod that flies bends as one that stands: what is left of its answer is held against what bends, not against the way it makes.
+/// A rod that flies bends as one that stands: what is left of its answer is held against what bends, not against the
+/// way it makes.
 TEST(Rounding, DoesNotHideInAFlight) {
   Outcome out[2];
   for (const int fast : {0, 1}) {
@@ -224,18 +236,22 @@ TEST(Rounding, DoesNotHideInAFlight) {
     out[fast] = run(scene, dynamics(1e-3, 0.01));
     ASSERT_TRUE(out[fast].finished) << out[fast].failure;
   }
-  auto sag = [](const Outcome &o) { return o.state.position[500].y() - 0.5 * (o.state.position[0].y() + o.state.position[1000].y()); };
+  auto sag = [](const Outcome &o) {
+    return o.state.position[500].y() - 0.5 * (o.state.position[0].y() + o.state.position[1000].y());
+  };
   EXPECT_LT(sag(out[0]), -1e-4);
   EXPECT_NEAR(sag(out[0]), sag(out[1]), 1e-5 * std::abs(sag(out[0]))); // -snes_rtol is 1e-6 of the load
 }
 
-/// What is computed from a state, in files or after a restart, knows its edges as well as the solver did: the moment of a tip load over 10 micrometres.
+/// What is computed from a state, in files or after a restart, knows its edges as well as the solver did: the moment of
+/// a tip load over 10 micrometres.
 TEST(Rounding, LeavesMomentsOfStatesRight) {
   Simulation sim;
   runTo(sim, cantilever(even(100000), Vec3(0, 3e-4, 0)), statics());
   const RodActions actions = rodActions(sim.scene, *sim.elements, sim.state, 1, 1);
   double worst = 0;
-  for (int v = 1; v < 100000; ++v) worst = std::max(worst, std::abs(actions.moment[v].z() / (3e-4 * (1 - 1e-5 * v)) - 1) * (1 - 1e-5 * v));
+  for (int v = 1; v < 100000; ++v)
+    worst = std::max(worst, std::abs(actions.moment[v].z() / (3e-4 * (1 - 1e-5 * v)) - 1) * (1 - 1e-5 * v));
   EXPECT_LT(worst, 1e-6); // from rounded positions it is 1e-2
 }
 
@@ -258,8 +274,9 @@ TEST(Rounding, DoesNotStopALightThread) {
   EXPECT_NEAR(out.state.position[10].y(), 3e-5, 1e-18);
 }
 
-/// What cannot be solved is refused, with the rod and its edges: nothing that an iteration could do is left after a few.
-/// A wire of steel on one pin, drawn level: it swings down about an axis that nothing holds, and hangs. Nothing holds its turns about itself either.
+/// What cannot be solved is refused, with the rod and its edges: nothing that an iteration could do is left after a
+/// few. A wire of steel on one pin, drawn level: it swings down about an axis that nothing holds, and hangs. Nothing
+/// holds its turns about itself either.
 TEST(Rounding, LetsAWireOnOnePinHang) {
   constexpr double young = 2e11;
   for (const int edges : {10, 100, 1000})
@@ -275,19 +292,23 @@ TEST(Rounding, LetsAWireOnOnePinHang) {
         const Outcome out = run(scene, settings);
         ASSERT_TRUE(out.finished) << edges << " edges: " << out.failure;
         const double stretch = 7800 * gravity / (2 * young);
-        EXPECT_LT((out.state.position.back() - Vec3(0, -1 - stretch, 0)).norm(), 1e-9) << edges; // 1e-6 of the weight across, over itself
-        EXPECT_LE(out.iterations, 12) << edges << " edges, gravity " << gravity;                  // 4 to 10; creeping along wrong directions took 20
+        EXPECT_LT((out.state.position.back() - Vec3(0, -1 - stretch, 0)).norm(), 1e-9)
+            << edges; // 1e-6 of the weight across, over itself
+        EXPECT_LE(out.iterations, 12) << edges << " edges, gravity "
+                                      << gravity; // 4 to 10; creeping along wrong directions took 20
       }
 }
 
-/// Rods and rings that rest as they are drawn, on one pin, without loads: an answer as they are, though nothing holds two or three of their turns.
+/// Rods and rings that rest as they are drawn, on one pin, without loads: an answer as they are, though nothing holds
+/// two or three of their turns.
 TEST(Rounding, LeavesRodsOnAPinAtRest) {
   Random random(5);
   for (int k = 0; k < 40; ++k) {
     const int edges = std::array{5, 12, 40, 100}[k % 4];
     const Vec3 direction = random.direction();
     const bool closed = k % 8 < 4;
-    Rod rod = inextensibleRod((closed ? ringShape(Vec3::Zero(), direction, 0.3, edges) : lineShape(Vec3::Zero(), direction, edges)).points);
+    Rod rod = inextensibleRod(
+        (closed ? ringShape(Vec3::Zero(), direction, 0.3, edges) : lineShape(Vec3::Zero(), direction, edges)).points);
     rod.closed = closed;
     if (closed) setBishopDirectors(rod);
     if (k % 3 == 0)
@@ -301,13 +322,15 @@ TEST(Rounding, LeavesRodsOnAPinAtRest) {
       settings.mixed = mixed;
       const Outcome out = run(scene, settings);
       ASSERT_TRUE(out.finished) << k << ": " << out.failure;
-      for (int i = 0; i < scene.rods[0].vertices(); ++i) EXPECT_LT((out.state.position[i] - scene.rods[0].position[i]).norm(), 1e-9) << k;
+      for (int i = 0; i < scene.rods[0].vertices(); ++i)
+        EXPECT_LT((out.state.position[i] - scene.rods[0].position[i]).norm(), 1e-9) << k;
     }
   }
 }
 
-/// A column of 30000 edges under 0.99998 of Euler's load, with a side load that bends it by 1e-3 or 1e-5: the softest mode is 2e-5 of the stiffness.
-/// Values of the same column with 10000 edges, or turned in space, agree to 1e-4 (the load is that near to the critical one).
+/// A column of 30000 edges under 0.99998 of Euler's load, with a side load that bends it by 1e-3 or 1e-5: the softest
+/// mode is 2e-5 of the stiffness. Values of the same column with 10000 edges, or turned in space, agree to 1e-4 (the
+/// load is that near to the critical one).
 TEST(Rounding, DoesNotHideASoftModeNearBuckling) {
   for (const auto &[side, tip] : {std::pair(1e-7, 1.549e-3), std::pair(1e-9, 1.6053e-5)}) {
     Scene scene = cantilever(even(30000), Vec3(-2.46735, side, 0));
@@ -333,7 +356,8 @@ TEST(Rounding, DoesNotHideBehindLoadsThatMoveNothing) {
   }
 }
 
-/// A strip that is bent the stiff way by a load 1e7 times that in its soft direction: what steps leave there below the tolerance must not add up.
+/// A strip that is bent the stiff way by a load 1e7 times that in its soft direction: what steps leave there below the
+/// tolerance must not add up.
 TEST(Rounding, DoesNotLetSoftDirectionsDrift) {
   Scene scene = cantilever(even(20), Vec3(0, 1e-8, 0.1));
   scene.rods[0].material.flexural_stiffness = {1, 1e-8};
@@ -357,7 +381,8 @@ TEST(Rounding, IsToldWhereItHidesTheAnswer) {
   scene.rods[0].name = "wire";
   const Outcome out = run(scene, settings);
   EXPECT_FALSE(out.finished);
-  for (const char *words : {"rod 'wire'", "rounding", "20000 edges", "fewer"}) EXPECT_NE(out.failure.find(words), std::string::npos) << out.failure;
+  for (const char *words : {"rod 'wire'", "rounding", "20000 edges", "fewer"})
+    EXPECT_NE(out.failure.find(words), std::string::npos) << out.failure;
   EXPECT_EQ(out.failure.find("iteration limit"), std::string::npos) << out.failure; // seen to be hopeless before
   LoopSettings steps = dynamics(0.01, 0.1);
   steps.solve.rounding_tolerance = 1e-16;
@@ -394,7 +419,8 @@ Draw draw(Random &random) {
 
 /// \param cut edges, each in so many parts
 Scene build(const Draw &d, int cut, bool away) {
-  // Edges grow and shrink by the spread along a line or an arc; coordinates are whole multiples of what their rounding at a million metres is.
+  // Edges grow and shrink by the spread along a line or an arc; coordinates are whole multiples of what their rounding
+  // at a million metres is.
   std::vector<double> at{0};
   for (int i = 0; i < d.edges; ++i)
     for (int k = 0; k < cut; ++k) at.push_back(at.back() + std::pow(d.spread, -std::abs(2.0 * i / d.edges - 1)) / cut);
@@ -419,18 +445,21 @@ Scene build(const Draw &d, int cut, bool away) {
 /// Root mean square distance of the vertices that two answers share, over the length.
 double apart(const Draw &d, const Outcome &a, const Outcome &b, int cut_a, int cut_b, const Vec3 &offset) {
   double sum = 0;
-  for (int i = 0; i <= d.edges; ++i) sum += (a.state.position[cut_a * i] - (b.state.position[cut_b * i] - offset)).squaredNorm();
+  for (int i = 0; i <= d.edges; ++i)
+    sum += (a.state.position[cut_a * i] - (b.state.position[cut_b * i] - offset)).squaredNorm();
   return std::sqrt(sum / (d.edges + 1)) / d.length;
 }
 
-/// Either a run is refused, or what two runs of the same scene disagree by is told: by the rounding errors they report and the estimated error of their edges.
+/// Either a run is refused, or what two runs of the same scene disagree by is told: by the rounding errors they report
+/// and the estimated error of their edges.
 TEST(Rounding, IsNeverMoreThanToldInRandomScenes) {
   Random random(12);
   int refused = 0;
   constexpr int scenes = 300;
   for (int k = 0; k < scenes; ++k) {
     const Draw d = draw(random);
-    const double period = d.length * d.length * std::sqrt(1 / d.length) / 3.516 * 2 * pi; // about that of the lowest vibration
+    const double period =
+        d.length * d.length * std::sqrt(1 / d.length) / 3.516 * 2 * pi; // about that of the lowest vibration
     const LoopSettings settings = d.dynamic ? dynamics(period / 40, period / 8) : statics();
     const Outcome here = run(build(d, 1, false), settings), away = run(build(d, 1, true), settings);
     const Outcome half = run(build(d, 2, false), settings), quarter = run(build(d, 4, false), settings);
@@ -440,14 +469,18 @@ TEST(Rounding, IsNeverMoreThanToldInRandomScenes) {
     }
     double moved = 0;
     const Scene start = build(d, 1, false);
-    for (int i = 0; i <= d.edges; ++i) moved = std::max(moved, (here.state.position[i] - start.rods[0].position[i]).norm() / d.length);
+    for (int i = 0; i <= d.edges; ++i)
+      moved = std::max(moved, (here.state.position[i] - start.rods[0].position[i]).norm() / d.length);
     // -snes_rtol is 1e-6 of the load; coordinates far away have as many digits.
     const double solved = 1e-5 * moved, digits = 1e-15 * (1 + d.offset / d.length);
     if (here.finished && away.finished)
-      EXPECT_LT(apart(d, here, away, 1, 1, std::round(d.offset) * Vec3(1, -1, 1)), 3 * (here.rounding_error + away.rounding_error) + solved + 3 * digits) << k;
+      EXPECT_LT(apart(d, here, away, 1, 1, std::round(d.offset) * Vec3(1, -1, 1)),
+                3 * (here.rounding_error + away.rounding_error) + solved + 3 * digits)
+          << k;
     if (here.finished && half.finished && quarter.finished) {
       const double told = 3 * (here.rounding_error + half.rounding_error + quarter.rounding_error) + solved + digits;
-      // Richardson's estimate, from once and twice the edges, covers what four times as many say: to leading order, of ten edges and more.
+      // Richardson's estimate, from once and twice the edges, covers what four times as many say: to leading order, of
+      // ten edges and more.
       const double estimate = 4.0 / 3 * apart(d, here, half, 1, 2, Vec3::Zero());
       EXPECT_LT(apart(d, here, quarter, 1, 4, Vec3::Zero()), 1.3 * estimate + told) << k;
     }

@@ -46,12 +46,14 @@ TEST(LinearSolvers, GiveTheSameRun) {
     const State other = run(&iterations);
     EXPECT_EQ(iterations, banded_iterations) << type;
     for (std::size_t v = 0; v < banded.position.size(); ++v)
-      EXPECT_LT((other.position[v] - banded.position[v]).norm(), 1e-9) << type << ", vertex " << v; // rounding of solves, of displacements of 0.1
+      EXPECT_LT((other.position[v] - banded.position[v]).norm(), 1e-9)
+          << type << ", vertex " << v; // rounding of solves, of displacements of 0.1
   }
 }
 
 /// Linear and nonlinear iterations of a run.
-std::pair<int, int> iterationsWith(Scene scene, const LoopSettings &settings, std::initializer_list<std::pair<const char *, const char *>> options) {
+std::pair<int, int> iterationsWith(Scene scene, const LoopSettings &settings,
+                                   std::initializer_list<std::pair<const char *, const char *>> options) {
   std::vector<std::unique_ptr<OptionSet>> set;
   for (const auto &[name, value] : options) set.push_back(std::make_unique<OptionSet>(name, value));
   Simulation sim;
@@ -64,17 +66,20 @@ std::pair<int, int> iterationsWith(Scene scene, const LoopSettings &settings, st
   return {int(linear), nonlinear};
 }
 
-/// Without fill its factors are those of the whole elimination where the band is full, as it is between neighbours of an open rod.
+/// Without fill its factors are those of the whole elimination where the band is full, as it is between neighbours of
+/// an open rod.
 TEST(LinearSolvers, IncompleteFactorsAreExactOnAnOpenRod) {
   Scene bar = chainAndRing(), ring = bar;
   bar.rods.pop_back();
   bar.supports.pop_back();
   ring.rods.erase(ring.rods.begin());
   ring.supports = {hold(ring, 0, 5, Support::Kind::pin)};
-  const auto [one, steps] = iterationsWith(bar, dynamics(0.02, 0.1), {{"-ksp_type", "cg"}, {"-pc_type", "ilu"}, {"-ksp_rtol", "1e-8"}});
+  const auto [one, steps] =
+      iterationsWith(bar, dynamics(0.02, 0.1), {{"-ksp_type", "cg"}, {"-pc_type", "ilu"}, {"-ksp_rtol", "1e-8"}});
   EXPECT_EQ(one, steps);
   EXPECT_GT(steps, 5);
-  const auto [more, others] = iterationsWith(ring, dynamics(0.02, 0.1), {{"-ksp_type", "cg"}, {"-pc_type", "ilu"}, {"-ksp_rtol", "1e-8"}});
+  const auto [more, others] =
+      iterationsWith(ring, dynamics(0.02, 0.1), {{"-ksp_type", "cg"}, {"-pc_type", "ilu"}, {"-ksp_rtol", "1e-8"}});
   EXPECT_GT(more, others);
   const auto [fewer, also] = iterationsWith(ring, dynamics(0.02, 0.1),
                                             {{"-ksp_type", "cg"},
@@ -87,7 +92,8 @@ TEST(LinearSolvers, IncompleteFactorsAreExactOnAnOpenRod) {
   EXPECT_LE(also, 2 * others + 5); // Newton pays with iterations of its own
 }
 
-/// Each way to search and to solve comes to the same motion, and none stays at the column's straight equilibrium, which is unstable.
+/// Each way to search and to solve comes to the same motion, and none stays at the column's straight equilibrium, which
+/// is unstable.
 TEST(Newton, ComesToTheSameAnswerByEveryWay) {
   Scene column = clampedScene(straightRod(32));
   column.forces = {{0, 32, Vec3(-4, 0, 0)}};
@@ -112,7 +118,8 @@ TEST(Newton, ComesToTheSameAnswerByEveryWay) {
     EXPECT_NEAR(deflection(still), bent, 1e-4) << name; // -snes_rtol 1e-6 of a load at 1.6 of the critical one
     int iterations = 0;
     const std::vector<Vec3> x = motion(moving, &iterations);
-    for (std::size_t v = 0; v < x.size(); ++v) EXPECT_LT((x[v] - moved[v]).norm(), 2e-6) << name << " " << v; // 1e-6 of displacements of 0.1, twenty times
+    for (std::size_t v = 0; v < x.size(); ++v)
+      EXPECT_LT((x[v] - moved[v]).norm(), 2e-6) << name << " " << v; // 1e-6 of displacements of 0.1, twenty times
     return iterations;
   };
   const int wolfe = compare("wolfe", [](LoopSettings &s) { s.solve.line_search = LineSearchKind::wolfe; });

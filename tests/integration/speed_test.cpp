@@ -1,4 +1,5 @@
-/// A guard against slow code: the time of a Newton iteration, in units of what LAPACK needs for the same band on the same machine at the same moment.
+/// A guard against slow code: the time of a Newton iteration, in units of what LAPACK needs for the same band on the
+/// same machine at the same moment.
 #include "support/rods.hpp"
 
 #include "bench.hpp"
@@ -6,15 +7,18 @@
 namespace tendril::test {
 namespace {
 
-/// Largest ratio of one whole Newton iteration (derivatives, factorisation, line search, everything around) to LAPACK's dpbtrf and dpbtrs: twice the 1.4
-/// that was measured with Debian's reference BLAS (docs/performance.md), so that only a real loss of speed trips it. Another BLAS has another ratio.
+/// Largest ratio of one whole Newton iteration (derivatives, factorisation, line search, everything around) to LAPACK's
+/// dpbtrf and dpbtrs: twice the 1.4 that was measured with Debian's reference BLAS (docs/performance.md), so that only
+/// a real loss of speed trips it. Another BLAS has another ratio.
 constexpr double most_newton_per_lapack = 2 * 1.4;
 
 TEST(Speed, OfANewtonIterationStaysNearThatOfItsLinearAlgebra) {
 #if !defined(NDEBUG) || defined(__SANITIZE_ADDRESS__)
   GTEST_SKIP() << "says nothing in a debug or sanitizer build";
 #endif
-  constexpr int edges = 400, repeats = 100; // of one step and of LAPACK in turn, short enough that on a busy machine some are left alone
+  constexpr int edges = 400,
+                repeats =
+                    100; // of one step and of LAPACK in turn, short enough that on a busy machine some are left alone
   const LoopSettings settings = dynamics(5e-3, 5e-3);
   Simulation simulation;
   EXPECT_PETSC(simulation.setUp(bench::cantilevers(1, edges), settings));
@@ -30,7 +34,8 @@ TEST(Speed, OfANewtonIterationStaysNearThatOfItsLinearAlgebra) {
     lapack = std::min(lapack, seconds);
   }
   RecordProperty("newton_per_lapack", std::to_string(newton / lapack));
-  EXPECT_LT(newton / lapack, most_newton_per_lapack) << 1e6 * newton / edges << " us per edge and iteration; LAPACK " << 1e6 * lapack / edges << " us";
+  EXPECT_LT(newton / lapack, most_newton_per_lapack)
+      << 1e6 * newton / edges << " us per edge and iteration; LAPACK " << 1e6 * lapack / edges << " us";
 }
 
 } // namespace

@@ -85,7 +85,8 @@ TEST(StateAccess, PositionsTakeFramesAndForcesAlong) {
   const std::vector<double> twists = rod.twists();
   EXPECT_NEAR(twists[8], 2 * pi, 1e-9);
   const Vec3 axis = Vec3(1, 2, 3).normalized();
-  for (int step = 0; step < 40; ++step) { // minimal rotations of every edge in small parts leave the twist but for their square
+  for (int step = 0; step < 40;
+       ++step) { // minimal rotations of every edge in small parts leave the twist but for their square
     std::vector<Vec3> x = rod.positions();
     for (Vec3 &v : x) v = Eigen::AngleAxisd(0.05, axis) * v;
     std::vector<Vec3> d = rod.directors();
@@ -98,7 +99,8 @@ TEST(StateAccess, PositionsTakeFramesAndForcesAlong) {
   std::vector<Vec3> x = rod.positions();
   for (Vec3 &v : x) v *= 1.25;
   rod.setPositions(x);
-  for (const double force : rod.axialForces()) EXPECT_NEAR(force, 0.25 * 1e7 * 0.01 * 0.006 * 1.125, 1e-8); // seed's strain, (l^2/L^2 - 1)/2
+  for (const double force : rod.axialForces())
+    EXPECT_NEAR(force, 0.25 * 1e7 * 0.01 * 0.006 * 1.125, 1e-8); // seed's strain, (l^2/L^2 - 1)/2
   Scene classical = sim.scene;
   for (Rod &r : classical.rods) r.energy = Energy::classical;
   Simulation other;
@@ -115,7 +117,9 @@ TEST(StateAccess, TwistsAreWhatIsWritten) {
   for (const bool held : {false, true}) {
     Scene scene;
     scene.rods = {straightRod(8, Measure::angle)};
-    if (held) scene.supports = {hold(scene, 0, 0, Support::Kind::clamp), hold(scene, 0, 5, Support::Kind::fix_twist), hold(scene, 0, 8, Support::Kind::clamp)};
+    if (held)
+      scene.supports = {hold(scene, 0, 0, Support::Kind::clamp), hold(scene, 0, 5, Support::Kind::fix_twist),
+                        hold(scene, 0, 8, Support::Kind::clamp)};
     Simulation sim;
     EXPECT_PETSC(sim.setUp(scene, statics()));
     RodAccess rod(sim, 0);
@@ -159,7 +163,9 @@ TEST(StateAccess, ARingClosesUpToWholeTurns) {
   for (const double a : access.twists()) EXPECT_NEAR(a, 2 * pi / 12, 1e-12);
   const State before = sim.state;
   angle[3] += 0.1;
-  EXPECT_NE(mistakeOf([&] { access.setTwists(angle); }).find("the twist angle at vertex 0 follows from the others: 0.4235"), std::string::npos);
+  EXPECT_NE(
+      mistakeOf([&] { access.setTwists(angle); }).find("the twist angle at vertex 0 follows from the others: 0.4235"),
+      std::string::npos);
   EXPECT_TRUE(sim.state == before);
 }
 
@@ -182,7 +188,9 @@ TEST(StateAccess, ReversedVelocitiesGoBackToTheStart) {
     one->setTwistRates(w);
   }
   advance(sim, settings, 0.2);
-  for (int v = 0; v < 25; ++v) EXPECT_LT((rod.positions()[v] - start.position[4 + v]).norm(), 1e-6) << v; // moved by up to centimetres, 100 steps of 1e-6
+  for (int v = 0; v < 25; ++v)
+    EXPECT_LT((rod.positions()[v] - start.position[4 + v]).norm(), 1e-6)
+        << v; // moved by up to centimetres, 100 steps of 1e-6
 }
 
 /// Also from within the loop: every integrator begins anew, so that the rods go on as from a state of the same content.
@@ -204,7 +212,8 @@ TEST(StateAccess, IsAllowedAfterEachStep) {
     RodAccess(between, "spring").stop();
     advance(between, settings, 0.1);
     for (int v = 0; v < 29; ++v)
-      EXPECT_LT((inside.state.position[v] - between.state.position[v]).norm(), 1e-12) << name << " " << v; // the steps differ by rounding
+      EXPECT_LT((inside.state.position[v] - between.state.position[v]).norm(), 1e-12)
+          << name << " " << v; // the steps differ by rounding
   }
 }
 
@@ -227,7 +236,8 @@ TEST(StateAccess, StaticsComeBackToTheirEquilibrium) {
   rod.setPositions(x);
   EXPECT_EQ(sim.state.time, 0); // what was written is no equilibrium
   advance(sim, statics(2), 1);
-  for (int v = 0; v <= 10; ++v) EXPECT_LT((sim.state.position[v] - answer[v]).norm(), 1e-7) << v; // -snes_rtol 1e-6 of a deflection of 0.3
+  for (int v = 0; v <= 10; ++v)
+    EXPECT_LT((sim.state.position[v] - answer[v]).norm(), 1e-7) << v; // -snes_rtol 1e-6 of a deflection of 0.3
 }
 
 TEST(StateAccess, StopAndReset) {
@@ -268,16 +278,21 @@ TEST(StateAccess, MistakesAreRefusedWhole) {
          rod.setPositions({x.begin(), x.end() - 1});
        }},
       {"rod 'spring': vertex 0 is held at (", [&] { rod.setPositions(with(x, 0, Vec3(x[0] + Vec3(0, 1, 0)))); }},
-      {"rod 'spring': vertex 3 has a coordinate that is not finite", [&] { rod.setPositions(with(x, 3, Vec3(0, NAN, 0))); }},
+      {"rod 'spring': vertex 3 has a coordinate that is not finite",
+       [&] { rod.setPositions(with(x, 3, Vec3(0, NAN, 0))); }},
       {"rod 'spring': edge 3 (vertex 3 to 4) has zero length", [&] { rod.setPositions(with(x, 4, x[3])); }},
-      {"rod 'spring': folds back on itself at vertex 4", [&] { rod.setPositions(with(x, 5, Vec3(0.5 * (x[3] + x[4])))); }},
+      {"rod 'spring': folds back on itself at vertex 4",
+       [&] { rod.setPositions(with(x, 5, Vec3(0.5 * (x[3] + x[4])))); }},
       {"rod 'spring': the director of edge 2 is (", [&] { rod.setDirectors(with(d, 2, Vec3(2 * d[2]))); }},
-      {"rod 'spring': the director of edge 2 is (", [&] { rod.setDirectors(with(d, 2, Vec3((x[3] - x[2]).normalized()))); }},
-      {"rod 'spring': is twisted by half a turn at vertex 2, the barrier", [&] { rod.setDirectors(with(d, 2, Vec3(-d[2]))); }},
+      {"rod 'spring': the director of edge 2 is (",
+       [&] { rod.setDirectors(with(d, 2, Vec3((x[3] - x[2]).normalized()))); }},
+      {"rod 'spring': is twisted by half a turn at vertex 2, the barrier",
+       [&] { rod.setDirectors(with(d, 2, Vec3(-d[2]))); }},
       {"measure tan takes less than half a turn", [&] { rod.setTwists(with(rod.twists(), 2, 3.2)); }},
       {"the twist angle at vertex 2 is not finite", [&] { rod.setTwists(with(rod.twists(), 2, HUGE_VAL)); }},
       {"rod 'spring': the velocity of vertex 1 is not finite", [&] { rod.setVelocities(with(x, 1, Vec3(NAN, 0, 0))); }},
-      {"rod 'spring': 25 twist rates given where it takes 24", [&] { rod.setTwistRates(std::vector<double>(25, 0.0)); }},
+      {"rod 'spring': 25 twist rates given where it takes 24",
+       [&] { rod.setTwistRates(std::vector<double>(25, 0.0)); }},
   };
   for (const auto &[message, call] : mistakes) {
     EXPECT_NE(mistakeOf(call).find(message), std::string::npos) << mistakeOf(call) << "\nwanted: " << message;

@@ -35,19 +35,22 @@ double stretchUnder(double tension, double axial_stiffness) {
   return s;
 }
 
-/// Vertices of the chain that hangs from the first vertex of a rod when its first edge pulls with a force there: horizontal and vertical equilibrium from
-/// vertex to vertex, without any energy or Newton. A chain whose edges all pull has no other equilibrium between its ends.
+/// Vertices of the chain that hangs from the first vertex of a rod when its first edge pulls with a force there:
+/// horizontal and vertical equilibrium from vertex to vertex, without any energy or Newton. A chain whose edges all
+/// pull has no other equilibrium between its ends.
 std::vector<Vec3> chain(const Scene &scene, const Vec3 &start, Vec3 force) {
   const Rod &rod = scene.rods[0];
   std::vector<Vec3> x{start};
   for (int i = 0; i < rod.edges(); ++i) {
-    x.push_back(x.back() + force.normalized() * rod.edge(i).norm() * stretchUnder(force.norm(), rod.material.axial_stiffness));
+    x.push_back(x.back() +
+                force.normalized() * rod.edge(i).norm() * stretchUnder(force.norm(), rod.material.axial_stiffness));
     if (i + 1 < rod.edges()) force += Vec3(0, 0.5 * gravity * (rod.edge(i).norm() + rod.edge(i + 1).norm()), 0);
   }
   return x;
 }
 
-/// Solves, and returns how far vertices are from the chain that ends where the rod does, over the length; the force in the first edge makes up for it.
+/// Solves, and returns how far vertices are from the chain that ends where the rod does, over the length; the force in
+/// the first edge makes up for it.
 double chainError(const Scene &scene, const LoopSettings &settings, Simulation &sim, int *iterations = nullptr) {
   runTo(sim, scene, settings, iterations);
   const std::vector<Vec3> &x = sim.state.position;
@@ -59,7 +62,9 @@ double chainError(const Scene &scene, const LoopSettings &settings, Simulation &
     Eigen::Matrix3d change;
     for (int a = 0; a < 3; ++a) {
       const double step = 1e-6 * force.norm();
-      change.col(a) = (chain(scene, x[0], force + step * Vec3::Unit(a)).back() - chain(scene, x[0], force - step * Vec3::Unit(a)).back()) / (2 * step);
+      change.col(a) = (chain(scene, x[0], force + step * Vec3::Unit(a)).back() -
+                       chain(scene, x[0], force - step * Vec3::Unit(a)).back()) /
+                      (2 * step);
     }
     force += change.fullPivLu().solve(missed);
   }
@@ -78,7 +83,8 @@ TEST(SlackCable, StraightStartsSlackenAtAnyStiffnessAndLoadStep) {
       for (const int steps : {1, 10, 100}) {
         SCOPED_TRACE(testing::Message() << edges << " edges, EA " << stiffness << ", " << steps << " load steps");
         Simulation sim;
-        EXPECT_LT(chainError(cable(line(edges), stiffness, Vec3::Zero(), Vec3(-0.2, 0, 0)), statics(steps), sim), chain_tolerance);
+        EXPECT_LT(chainError(cable(line(edges), stiffness, Vec3::Zero(), Vec3(-0.2, 0, 0)), statics(steps), sim),
+                  chain_tolerance);
       }
 }
 
@@ -109,7 +115,8 @@ TEST(SlackCable, StartsInAnyShapeAndMotionFindTheHangingChain) {
       for (const double stiffness : {1e2, 1e5, 1e8})
         for (const bool mixed : {true, false}) {
           if (!mixed && stiffness > 1e6) continue; // forces of the primal form are rounded strains times EA
-          SCOPED_TRACE(testing::Message() << c.what << ", " << edges << " edges, EA " << stiffness << (mixed ? "" : ", primal"));
+          SCOPED_TRACE(testing::Message()
+                       << c.what << ", " << edges << " edges, EA " << stiffness << (mixed ? "" : ", primal"));
           LoopSettings settings = statics(3);
           settings.mixed = mixed;
           Simulation sim;
@@ -121,7 +128,8 @@ TEST(SlackCable, StartsInAnyShapeAndMotionFindTheHangingChain) {
 /// The catenary of length 1 over a span of 0.8: a sinh(0.4/a) = 0.5, sag a (cosh(0.4/a) - 1).
 TEST(SlackCable, SagIsThatOfTheCatenaryAtSecondOrder) {
   double low = 0.1, high = 10;
-  for (int k = 0; k < 200; ++k) (std::sinh(0.4 / (0.5 * (low + high))) * 0.5 * (low + high) > 0.5 ? low : high) = 0.5 * (low + high);
+  for (int k = 0; k < 200; ++k)
+    (std::sinh(0.4 / (0.5 * (low + high))) * 0.5 * (low + high) > 0.5 ? low : high) = 0.5 * (low + high);
   const double sag = low * (std::cosh(0.4 / low) - 1);
   EXPECT_NEAR(sag, 0.2654, 5e-5);
   std::array<double, 3> error{};
@@ -140,12 +148,14 @@ TEST(SlackCable, IterationsHardlyGrowWithTheEdges) {
     int iterations = 0;
     Simulation sim;
     runTo(sim, cable(line(edges), 1e4, Vec3::Zero(), Vec3(-0.2, 0, 0)), statics(), &iterations);
-    EXPECT_LT(iterations, 60) << edges << " edges";                                      // measured 15 to 40, and 11 at 100 000 edges
-    EXPECT_NEAR(sim.state.position[edges / 2].y(), -0.26577, 2e-4) << edges << " edges"; // 0.2654 and a stretch of about 4e-4
+    EXPECT_LT(iterations, 60) << edges << " edges"; // measured 15 to 40, and 11 at 100 000 edges
+    EXPECT_NEAR(sim.state.position[edges / 2].y(), -0.26577, 2e-4)
+        << edges << " edges"; // 0.2654 and a stretch of about 4e-4
   }
 }
 
-/// A ring closed from a straight strip, drawn bent about its stiff axis, in the plane, where it is an unstable equilibrium.
+/// A ring closed from a straight strip, drawn bent about its stiff axis, in the plane, where it is an unstable
+/// equilibrium.
 Scene stiffRing(int edges, const std::vector<double> &stiffness) {
   Scene scene;
   scene.gravity = Vec3::Zero();
@@ -167,7 +177,8 @@ Scene stiffRing(int edges, const std::vector<double> &stiffness) {
 }
 
 double bendingEnergy(const Simulation &sim, int r) {
-  const EnergyBudget e = energyBudget(sim.scene, *sim.elements, sim.state, configurationOf(sim.state, sim.scene, *sim.elements, 1), 1, r);
+  const EnergyBudget e =
+      energyBudget(sim.scene, *sim.elements, sim.state, configurationOf(sim.state, sim.scene, *sim.elements, 1), 1, r);
   return e.stretch + e.bend + e.twist;
 }
 
@@ -176,10 +187,12 @@ TEST(StiffRing, TurnsToItsSoftAxisFromEachUnstableStart) {
     for (const int steps : {1, 5}) {
       Simulation drawn, sim;
       EXPECT_PETSC(drawn.setUp(stiffRing(80, {ratio}), statics()));
-      EXPECT_NEAR(energyBudget(drawn.scene, *drawn.elements, drawn.state, 1).bend, ratio * 2 * pi, 1e-3 * ratio * 2 * pi);
+      EXPECT_NEAR(energyBudget(drawn.scene, *drawn.elements, drawn.state, 1).bend, ratio * 2 * pi,
+                  1e-3 * ratio * 2 * pi);
       runTo(sim, stiffRing(80, {ratio}), statics(steps));
       // pi EI2/R; 80 edges store 2.5e-4 more
-      EXPECT_NEAR(bendingEnergy(sim, 0), 2 * pi, 4e-4 * 2 * pi) << "EI1/EI2 " << ratio << ", " << steps << " load steps";
+      EXPECT_NEAR(bendingEnergy(sim, 0), 2 * pi, 4e-4 * 2 * pi)
+          << "EI1/EI2 " << ratio << ", " << steps << " load steps";
     }
 }
 
@@ -199,7 +212,8 @@ TEST(StiffRing, RingsOfOneSceneLeaveEachByItself) {
   const std::vector<double> stiffness{2, 1, 5, 1.2, 3, 8, 1.5, 1, 2.5, 4, 6, 7, 1.1, 9};
   Simulation sim;
   runTo(sim, stiffRing(40, stiffness), statics());
-  for (int r = 0; r < int(stiffness.size()); ++r) EXPECT_NEAR(bendingEnergy(sim, r), 2 * pi, 1.5e-3 * 2 * pi) << "EI1/EI2 " << stiffness[r]; // 4 x 2.5e-4
+  for (int r = 0; r < int(stiffness.size()); ++r)
+    EXPECT_NEAR(bendingEnergy(sim, r), 2 * pi, 1.5e-3 * 2 * pi) << "EI1/EI2 " << stiffness[r]; // 4 x 2.5e-4
 }
 
 /// A straight rod of length 1, EI 1 and EA L^2/EI 1e6, whose last vertex moves in.
@@ -214,7 +228,8 @@ Scene pushed(int edges, Support::Kind kind, double by, double weight) {
   return scene;
 }
 
-/// Between fine edges Newton begins where fewer end: without that, 65 to 875 iterations and rejected steps at 1000 edges, and no end at 10 000.
+/// Between fine edges Newton begins where fewer end: without that, 65 to 875 iterations and rejected steps at 1000
+/// edges, and no end at 10 000.
 TEST(FineRods, PushedInTheyBendInOneStepAsCoarseOnesDo) {
   LoopSettings settings = statics();
   settings.bifurcation = Bifurcation::off; // bisections would be most of the time
@@ -229,7 +244,8 @@ TEST(FineRods, PushedInTheyBendInOneStepAsCoarseOnesDo) {
           int iterations = 0;
           runTo(sim, pushed(edges, kind, by, weight), settings, &iterations);
           EXPECT_EQ(sim.state.step, 1);
-          EXPECT_LT(iterations, 45); // measured 9 to 36: up to 10 before fewer edges are tried, the rest where the plane of bending is free to turn
+          EXPECT_LT(iterations, 45); // measured 9 to 36: up to 10 before fewer edges are tried, the rest where the
+                                     // plane of bending is free to turn
           energy[k++] = bendingEnergy(sim, 0);
         }
         EXPECT_NEAR(energy[0] / energy[1], 1, 1e-3); // second order: 100 edges are off by (pi/100)^2/3 of it and less
@@ -243,7 +259,8 @@ TEST(FineRods, RingsTurnToTheirSoftAxisAndHangOnPins) {
     Simulation sim;
     int iterations = 0;
     runTo(sim, stiffRing(5000, {ratio}), settings, &iterations);
-    EXPECT_NEAR(bendingEnergy(sim, 0), 2 * pi * (1 - 4e-6), 1e-6 * 2 * pi) << "EI1/EI2 " << ratio; // less EI/(EA R^2) for the stretch; edges: 1e-7
+    EXPECT_NEAR(bendingEnergy(sim, 0), 2 * pi * (1 - 4e-6), 1e-6 * 2 * pi)
+        << "EI1/EI2 " << ratio; // less EI/(EA R^2) for the stretch; edges: 1e-7
     EXPECT_LT(iterations, 30) << "EI1/EI2 " << ratio;
   }
   double sag[2];

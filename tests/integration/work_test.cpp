@@ -8,7 +8,8 @@ namespace tendril::test {
 namespace {
 
 struct Balance {
-  double loads = 0, supports = 0, dissipated = 0, least = 0; ///< sums over a run, and the least dissipation of a step [J]
+  double loads = 0, supports = 0, dissipated = 0,
+         least = 0; ///< sums over a run, and the least dissipation of a step [J]
   EnergyBudget start, end;
 };
 
@@ -30,7 +31,8 @@ Balance run(Simulation &sim, const Scene &scene, const LoopSettings &settings, c
   TimeLoop loop(sim.solver, settings);
   EXPECT_EQ(loop.run(sim.state, observe, &finished), PetscErrorCode(0));
   EXPECT_TRUE(finished) << loop.failure();
-  EXPECT_NEAR(b.end.total() - b.start.total(), b.loads + b.supports - b.dissipated, 1e-12 * (std::abs(b.loads) + std::abs(b.supports) + b.end.kinetic));
+  EXPECT_NEAR(b.end.total() - b.start.total(), b.loads + b.supports - b.dissipated,
+              1e-12 * (std::abs(b.loads) + std::abs(b.supports) + b.end.kinetic));
   return b;
 }
 Balance run(const Scene &scene, const LoopSettings &settings, const char *tolerance = "1e-10") {
@@ -79,7 +81,8 @@ TEST(WorkOfSupports, TwistsARodByWholeTurns) {
   Scene scene = clampedScene(straightRod(60, Measure::angle));
   scene.supports.push_back(hold(scene, 0, 60, Support::Kind::clamp));
   scene.supports[1].motion.angular_velocity = Vec3(angle, 0, 0);
-  for (Rod &rod : scene.rods) rod.material.flexural_stiffness = {40, 40}; // straight at 12.6 rad: below 2 pi EI/GJ by far
+  for (Rod &rod : scene.rods)
+    rod.material.flexural_stiffness = {40, 40}; // straight at 12.6 rad: below 2 pi EI/GJ by far
   Simulation sim;
   const Balance b = run(sim, scene, statics(1));
   const double exact = 0.5 * (2.0 / 3) * angle * angle;
@@ -117,10 +120,13 @@ TEST(WorkInStatics, IsWhatIsStored) {
   EXPECT_NEAR(order(left[1], left[2]), 2, 0.2);
 }
 
-/// What damping takes, with the work of supports and forces in the balance, comes out to the order of the method; where couples act, too, to second order. The
-/// start is without a jump: of a rod that moves along with its clamp, damped by its mass, or of one at rest whose clamp turns, damped by its stiffness too.
+/// What damping takes, with the work of supports and forces in the balance, comes out to the order of the method; where
+/// couples act, too, to second order. The start is without a jump: of a rod that moves along with its clamp, damped by
+/// its mass, or of one at rest whose clamp turns, damped by its stiffness too.
 TEST(WorkInDynamics, IsOfTheOrderOfTheMethod) {
-  auto dissipated = [](const Scene &scene, const std::string &name, double dt) { return run(scene, by(name, dt, 0.4), "1e-10").dissipated; };
+  auto dissipated = [](const Scene &scene, const std::string &name, double dt) {
+    return run(scene, by(name, dt, 0.4), "1e-10").dissipated;
+  };
   enum class Case { travels, turns, couples };
   for (const Case c : {Case::travels, Case::turns, Case::couples}) {
     Scene scene = loaded(4);
@@ -134,9 +140,11 @@ TEST(WorkInDynamics, IsOfTheOrderOfTheMethod) {
     if (c != Case::couples) scene.moments.clear();
     const double fine = dissipated(scene, "sdirk33", 1.25e-3);
     for (const std::string &name : integratorNames()) {
-      if (c != Case::travels && name == "generalized_alpha") continue; // its accelerations at the start do not know that supports set off
+      if (c != Case::travels && name == "generalized_alpha")
+        continue; // its accelerations at the start do not know that supports set off
       SCOPED_TRACE(name + " " + std::to_string(int(c)));
-      // Multistep methods damp waves of up to 65 rad/s, which the start sets going, before they are of their order; others come to rounding soon.
+      // Multistep methods damp waves of up to 65 rad/s, which the start sets going, before they are of their order;
+      // others come to rounding soon.
       const double longest = makeIntegrator({name})->remembersActions() > 0 || name == "euler" ? 2e-3 : 1e-2;
       std::array<double, 3> d{};
       for (int k = 0; k < 3; ++k) d[k] = dissipated(scene, name, longest / (1 << k));
@@ -172,8 +180,10 @@ TEST(WorkOfLoads, OfATorqueIsItsTurn) {
   scene.moments = {{0, 5, torque, Vec3(torque, 0, 0)}};
   for (const std::string &name : integratorNames()) {
     const Balance b = run(scene, by(name, 0.005, 1));
-    if (name != "euler") EXPECT_NEAR(b.loads, b.end.kinetic + b.end.twist - b.start.total(), 1e-2 * b.loads) << name; // second order, in 200 steps
-    EXPECT_GT(b.loads, 10) << name;                                                                                   // some turns: (2 C t)^2/(2 J)
+    if (name != "euler")
+      EXPECT_NEAR(b.loads, b.end.kinetic + b.end.twist - b.start.total(), 1e-2 * b.loads)
+          << name;                  // second order, in 200 steps
+    EXPECT_GT(b.loads, 10) << name; // some turns: (2 C t)^2/(2 J)
     EXPECT_EQ(b.supports, 0) << name;
   }
 }

@@ -69,7 +69,8 @@ Scene turnedScene(int edges = 8) {
   setBishopDirectors(ring);
   Scene scene;
   scene.rods = {bar, ring};
-  scene.supports = {hold(scene, 0, 0, Support::Kind::clamp), hold(scene, 0, edges, Support::Kind::clamp), hold(scene, 1, 5, Support::Kind::pin)};
+  scene.supports = {hold(scene, 0, 0, Support::Kind::clamp), hold(scene, 0, edges, Support::Kind::clamp),
+                    hold(scene, 1, 5, Support::Kind::pin)};
   scene.supports[0].motion.velocity = Vec3(0.1, 0, 0.2);
   scene.supports[1].motion.angular_velocity = Vec3(240, 0, 0);
   scene.forces = {{0, edges - 3, Vec3(0, 1, 0)}};
@@ -82,14 +83,17 @@ LoopSettings settingsOf(const std::string &integrator) {
   return settings;
 }
 
-void prepare(Simulation &sim, const Scene &scene, const LoopSettings &settings) { EXPECT_PETSC(sim.setUp(scene, settings)); }
+void prepare(Simulation &sim, const Scene &scene, const LoopSettings &settings) {
+  EXPECT_PETSC(sim.setUp(scene, settings));
+}
 
 /// A run with another number in every field of its state, and the control of its loop.
 struct Filled {
   Simulation sim;
   StepControl control;
   RunFacts facts;
-  explicit Filled(const Scene &scene = turnedScene(), const LoopSettings &settings = settingsOf("bdf2")) : facts(scene, settings) {
+  explicit Filled(const Scene &scene = turnedScene(), const LoopSettings &settings = settingsOf("bdf2"))
+      : facts(scene, settings) {
     prepare(sim, scene, settings);
     Filler fill(*sim.elements);
     eachField(sim.state, fill);
@@ -210,7 +214,8 @@ TEST(Checkpoint, EveryFlippedBitIsFound) {
   EXPECT_GE(refused, int(in_data));
 }
 
-/// Sizes that the scene does not have are refused before there is memory for them: these would take more than any machine has.
+/// Sizes that the scene does not have are refused before there is memory for them: these would take more than any
+/// machine has.
 TEST(Checkpoint, SizesOfAnotherSceneTakeNoMemory) {
   const Folder folder;
   const std::string path = folder.path("checkpoint.h5");
@@ -226,7 +231,8 @@ TEST(Checkpoint, SizesOfAnotherSceneTakeNoMemory) {
     const Hdf5Dataset data = H5Dcreate2(file.id(), "velocity", H5T_IEEE_F64LE, space, H5P_DEFAULT, create, H5P_DEFAULT);
     ASSERT_GE(hid_t(data), 0);
   }
-  EXPECT_TRUE(says(messageOf([&] { Taken(path, turnedScene(), settingsOf("bdf2")); }), "'velocity' has 1125899906842624 entries"));
+  EXPECT_TRUE(says(messageOf([&] { Taken(path, turnedScene(), settingsOf("bdf2")); }),
+                   "'velocity' has 1125899906842624 entries"));
 }
 
 TEST(Checkpoint, TellsWhatHasChanged) {
@@ -244,12 +250,15 @@ TEST(Checkpoint, TellsWhatHasChanged) {
   settings.dt = 0.02;
   const Taken taken(path, scene, settings);
   EXPECT_TRUE(taken.changed);
-  for (const char *part : {"gravity: [0, -9.81, 0] -> [0, 0, -1]", "material of rod", "law of rod 'ring': measure angle, energy seed -> measure tan",
-                           "new since the checkpoint: force on vertex 4 of rod", "no longer there: support at vertex 5 of rod 'ring': pin",
-                           "support at vertex 8 of rod", "dt: 0.01 -> 0.02"})
+  for (const char *part :
+       {"gravity: [0, -9.81, 0] -> [0, 0, -1]", "material of rod",
+        "law of rod 'ring': measure angle, energy seed -> measure tan",
+        "new since the checkpoint: force on vertex 4 of rod", "no longer there: support at vertex 5 of rod 'ring': pin",
+        "support at vertex 8 of rod", "dt: 0.01 -> 0.02"})
     EXPECT_TRUE(says(taken.all(), part)) << taken.all();
   EXPECT_TRUE(says(taken.all(), "rod 'ring' loses its whole turns"));
-  EXPECT_TRUE(says(taken.all(), "the support at vertex 8 of rod '" + scene.rods[0].name + "' is ")); // every number of this state is another
+  EXPECT_TRUE(says(taken.all(), "the support at vertex 8 of rod '" + scene.rods[0].name +
+                                    "' is ")); // every number of this state is another
   EXPECT_EQ(taken.control.dt, 0) << "the step asked for now";
   EXPECT_TRUE(taken.sim.state.memory.empty());
 }
@@ -268,7 +277,8 @@ TEST(Checkpoint, OtherLoadsLeaveTheStateAlone) {
   EXPECT_EQ(taken.told.size(), 1U) << taken.all();
 }
 
-/// A clamp in the middle of a rod goes: its half cells become a whole one, of the same twist, whole turns included; and it comes back.
+/// A clamp in the middle of a rod goes: its half cells become a whole one, of the same twist, whole turns included; and
+/// it comes back.
 TEST(Checkpoint, TurnsStayWhereSupportsComeAndGo) {
   const Folder folder;
   const std::string path = folder.path("checkpoint.h5"), back = folder.path("back.h5");
@@ -299,7 +309,8 @@ TEST(Checkpoint, StaticsAndDynamicsFollowEachOther) {
   LoopSettings statics = settingsOf("euler");
   statics.dynamic = false;
   for (const bool to_dynamics : {true, false}) {
-    const LoopSettings &from = to_dynamics ? statics : settingsOf("bdf2"), to = to_dynamics ? settingsOf("bdf2") : statics;
+    const LoopSettings &from = to_dynamics ? statics : settingsOf("bdf2"),
+                       to = to_dynamics ? settingsOf("bdf2") : statics;
     const Filled written(scene, from);
     written.write(path);
     const Taken taken(path, scene, to);
@@ -307,7 +318,8 @@ TEST(Checkpoint, StaticsAndDynamicsFollowEachOther) {
     const State &s = taken.sim.state;
     EXPECT_EQ(s.time, 0);
     EXPECT_EQ(s.step, 0);
-    EXPECT_TRUE(s.position == written.sim.state.position && s.director == written.sim.state.director && s.turns == written.sim.state.turns);
+    EXPECT_TRUE(s.position == written.sim.state.position && s.director == written.sim.state.director &&
+                s.turns == written.sim.state.turns);
     for (const Vec3 &v : s.velocity) EXPECT_EQ(v.norm(), 0);
     for (const double w : s.twist_rate) EXPECT_EQ(w, 0);
     EXPECT_TRUE(s.memory.empty());
@@ -334,11 +346,13 @@ TEST(Checkpoint, RunsGoOnToTheSameBits) {
       auto run = [&](Simulation &sim, TimeLoop &loop, bool writes) {
         bool finished = false;
         const auto observe = [&](const State &state, const Diagnostics &row) {
-          for (const double value : {row.dissipated, row.work.supports, row.work.loads}) balance[state.step].push_back(value);
+          for (const double value : {row.dissipated, row.work.supports, row.work.loads})
+            balance[state.step].push_back(value);
           if (writes && state.time > 0.07) {
             writeCheckpoint(path, sim, loop.control, RunFacts(sim.scene, settings));
             writes = false;
-            EXPECT_TRUE(std::any_of(state.turns.begin(), state.turns.begin() + sim.elements->rod_cells[1], [](double t) { return t != 0; }));
+            EXPECT_TRUE(std::any_of(state.turns.begin(), state.turns.begin() + sim.elements->rod_cells[1],
+                                    [](double t) { return t != 0; }));
             const bool forgets = name == "euler" || name == "sdirk2" || name == "symplectic2";
             EXPECT_EQ(state.memory.empty(), forgets);
             EXPECT_EQ(state.strains.empty(), forgets || name == "sdirk23" || name == "sdirk33");

@@ -25,8 +25,10 @@ TEST(Keys, HaveTheirBlockAndFallbacksWithinTheirBounds) {
       const std::vector<std::string> choices = choicesOf(key);
       EXPECT_NE(std::find(choices.begin(), choices.end(), key.fallback), choices.end()) << key.path;
     }
-    if ((key.type == KeyType::number || key.type == KeyType::integer) && key.hasFallback()) EXPECT_EQ(outOfBounds(key, std::stod(key.fallback)), "") << key.path;
-    if ((key.type == KeyType::number || key.type == KeyType::integer) && *key.example) EXPECT_EQ(outOfBounds(key, std::stod(key.example)), "") << key.path;
+    if ((key.type == KeyType::number || key.type == KeyType::integer) && key.hasFallback())
+      EXPECT_EQ(outOfBounds(key, std::stod(key.fallback)), "") << key.path;
+    if ((key.type == KeyType::number || key.type == KeyType::integer) && *key.example)
+      EXPECT_EQ(outOfBounds(key, std::stod(key.example)), "") << key.path;
   }
 }
 

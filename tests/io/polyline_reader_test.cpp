@@ -9,7 +9,8 @@ namespace {
 
 TEST(PolylineReader, ReadsPointsWithCommentsAndSeveralRods) {
   const Folder folder;
-  const std::string text = "# x, y, z\n0, 0.5, 0\n1 0 -2e-1   # the end of a line\n# between points\n2,0,0\r\n\n\n  \n3 0 0\n4\t0\t0\n";
+  const std::string text =
+      "# x, y, z\n0, 0.5, 0\n1 0 -2e-1   # the end of a line\n# between points\n2,0,0\r\n\n\n  \n3 0 0\n4\t0\t0\n";
   for (const char *name : {"a.csv", "a.txt", "a.CSV"}) {
     const auto lines = readPolylines(folder.write(name, text));
     ASSERT_EQ(lines.size(), 2u) << name;
@@ -24,14 +25,16 @@ TEST(PolylineReader, ReadsPointsWithCommentsAndSeveralRods) {
 
 TEST(PolylineReader, ReadsLinesOfObj) {
   const Folder folder;
-  const auto lines = readPolylines(
-      folder.write("a.obj", "o ring and rods\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nl 1 2 3 1\nv 1 0 0\nv 0 1 0\nl -2/1 -1/2\nv 0 0 0\nv 5 0 0\nl 6 7\n"));
+  const auto lines =
+      readPolylines(folder.write("a.obj", "o ring and rods\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nl 1 2 3 1\nv 1 0 0\nv "
+                                          "0 1 0\nl -2/1 -1/2\nv 0 0 0\nv 5 0 0\nl 6 7\n"));
   ASSERT_EQ(lines.size(), 3u);
   EXPECT_TRUE(lines[0].closed);
   ASSERT_EQ(lines[0].points.size(), 3u); // the first is not repeated
   EXPECT_EQ(lines[0].points[2], Vec3(0, 1, 0));
   EXPECT_FALSE(lines[1].closed);
-  EXPECT_EQ(lines[1].points, (std::vector<Vec3>{{1, 0, 0}, {0, 1, 0}})); // counted from the end, with texture coordinates
+  EXPECT_EQ(lines[1].points,
+            (std::vector<Vec3>{{1, 0, 0}, {0, 1, 0}})); // counted from the end, with texture coordinates
   EXPECT_EQ(lines[2].points, (std::vector<Vec3>{{0, 0, 0}, {5, 0, 0}}));
 }
 
@@ -52,7 +55,8 @@ std::vector<std::vector<int>> chainsOf(const std::string &elements, std::vector<
 TEST(PolylineReader, JoinsLinesOfObjThatShareVertices) {
   using Chains = std::vector<std::vector<int>>;
   EXPECT_EQ(chainsOf("l 1 2\nl 2 3\nl 3 4\n"), (Chains{{1, 2, 3, 4}}));
-  EXPECT_EQ(chainsOf("l 3 4\nl 7 8\nl 2 1\nl 3 2\nl 8 9\n"), (Chains{{1, 2, 3, 4}, {7, 8, 9}})); // in any order, the way of the first edge
+  EXPECT_EQ(chainsOf("l 3 4\nl 7 8\nl 2 1\nl 3 2\nl 8 9\n"),
+            (Chains{{1, 2, 3, 4}, {7, 8, 9}})); // in any order, the way of the first edge
   EXPECT_EQ(chainsOf("l 4 3\nl 2 3 \nl 1 2\n"), (Chains{{4, 3, 2, 1}}));
   EXPECT_EQ(chainsOf("l 1 2 3\nl 5 4 3\n"), (Chains{{1, 2, 3, 4, 5}}));
   std::vector<bool> closed;
@@ -69,7 +73,8 @@ TEST(PolylineReader, ByteOrderMarksAreNoText) {
                                                 "0,0,0\n1,0,0\n"))[0]
                 .points,
             (std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}}));
-  EXPECT_EQ(readPolylines(folder.write("a.obj", "\xEF\xBB\xBFv 5 5 5\nv 0 0 0\nv 1 0 0\nl 2 3\n"))[0].points, (std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}}));
+  EXPECT_EQ(readPolylines(folder.write("a.obj", "\xEF\xBB\xBFv 5 5 5\nv 0 0 0\nv 1 0 0\nl 2 3\n"))[0].points,
+            (std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}}));
 }
 
 /// An HDF5 file of five points, with what else is asked for.

@@ -24,8 +24,8 @@ Diagnostics rowAt(double time) {
 
 TEST(Progress, TellsLoadFactorsInStatics) {
   const std::string path = (std::filesystem::temp_directory_path() / "tendril_progress_log.txt").string();
-  for (const auto &[settings, words] :
-       {std::pair{statics(), "load factor 0.5 of 1  increment 0.5  its"}, std::pair{dynamics(0.5, 2), "time 0.5 of 2  dt 0.5  its"}}) {
+  for (const auto &[settings, words] : {std::pair{statics(), "load factor 0.5 of 1  increment 0.5  its"},
+                                        std::pair{dynamics(0.5, 2), "time 0.5 of 2  dt 0.5  its"}}) {
     testing::internal::CaptureStdout();
     { Progress(settings, path).step(rowAt(0.5)); }
     const std::string out = testing::internal::GetCapturedStdout();

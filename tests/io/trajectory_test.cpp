@@ -134,7 +134,8 @@ TEST(Trajectory, EveryFieldHasAUnitAndAPlace) {
     EXPECT_NE(written.attribute("state/" + name, "unit"), "(none)") << name;
     EXPECT_NE(written.attribute("state/" + name, "place"), "(none)") << name;
   }
-  for (const DiagnosticsColumn &column : diagnosticsColumns()) EXPECT_EQ(written.attribute("diagnostics/" + column.name, "unit"), column.unit);
+  for (const DiagnosticsColumn &column : diagnosticsColumns())
+    EXPECT_EQ(written.attribute("diagnostics/" + column.name, "unit"), column.unit);
   EXPECT_EQ(written.attribute("state/turns", "place"), "cells");
   EXPECT_EQ(written.attribute("time", "unit"), "s");
 }

@@ -31,12 +31,19 @@ TEST(Alike, WhateverMovesARodCounts) {
   EXPECT_EQ(kindsAfter([](Scene &s, int r) { s.rods[r].initial_velocity.z() = 1; }), others);
   EXPECT_EQ(kindsAfter([](Scene &s, int r) { s.rods[r].measure = Measure::angle; }), others);
   EXPECT_EQ(kindsAfter([](Scene &s, int r) { s.rods[r].energy = Energy::classical; }), others);
-  EXPECT_EQ(kindsAfter([](Scene &s, int r) { s.rods[r].director[3] = s.rods[r].edge(3).normalized().cross(s.rods[r].director[3]); }), others);
+  EXPECT_EQ(kindsAfter([](Scene &s, int r) {
+              s.rods[r].director[3] = s.rods[r].edge(3).normalized().cross(s.rods[r].director[3]);
+            }),
+            others);
   EXPECT_EQ(kindsAfter([](Scene &s, int r) { s.supports[r].kind = Support::Kind::pin; }), others);
-  EXPECT_EQ(kindsAfter([](Scene &s, int r) { s.supports[r].motion.table = {{0, Vec3::Zero(), Vec3::Zero()}, {1, Vec3::UnitX(), Vec3::Zero()}}; }), others);
+  EXPECT_EQ(kindsAfter([](Scene &s, int r) {
+              s.supports[r].motion.table = {{0, Vec3::Zero(), Vec3::Zero()}, {1, Vec3::UnitX(), Vec3::Zero()}};
+            }),
+            others);
   EXPECT_EQ(kindsAfter([](Scene &s, int r) { s.forces[r].force.x() = 1; }), others);
   EXPECT_EQ(kindsAfter([](Scene &s, int r) { s.moments.push_back({r, 2, 0.1, Vec3::Zero()}); }), others);
-  for (const EdgeMoment &other : {EdgeMoment{0, 2, 0.2, Vec3::UnitX()}, EdgeMoment{0, 3, 0.1, Vec3::UnitX()}, EdgeMoment{0, 2, 0.1, Vec3::UnitY()}}) {
+  for (const EdgeMoment &other : {EdgeMoment{0, 2, 0.2, Vec3::UnitX()}, EdgeMoment{0, 3, 0.1, Vec3::UnitX()},
+                                  EdgeMoment{0, 2, 0.1, Vec3::UnitY()}}) {
     const auto change = [&](Scene &s, int r) {
       for (int k = 0; k < 4; ++k) s.moments.push_back({k, 2, 0.1, Vec3::UnitX()});
       s.moments[r] = other;

@@ -33,7 +33,8 @@ TEST(Ring, IsARegularPolygonCounterClockwiseAboutItsNormal) {
 }
 
 TEST(Helix, FollowsItsFormula) {
-  // (1.25 s, 0.125 T cos 16 pi s, 0.125 T sin 16 pi s), T a smooth step over the first and last tenth: data/scenes/helix.yaml at the origin.
+  // (1.25 s, 0.125 T cos 16 pi s, 0.125 T sin 16 pi s), T a smooth step over the first and last tenth:
+  // data/scenes/helix.yaml at the origin.
   const Polyline p = helixShape({Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY(), 1.25, 0.125, 8, 0.1, 128});
   ASSERT_EQ(p.points.size(), 129u);
   for (int k = 0; k <= 128; ++k) {

@@ -59,8 +59,9 @@ TEST(Grading, CutsEveryEdgeInTwo) {
 }
 
 TEST(Grading, LeavesUniformCurvesAlone) {
-  for (const Polyline &shape : {lineShape(Vec3::Zero(), Vec3::UnitX(), 24), ringShape(Vec3::Zero(), Vec3::UnitZ(), 1, 24),
-                                helixShape({Vec3::Zero(), Vec3::UnitZ(), Vec3::UnitX(), 1, 0.5, 3, 0, 24})}) {
+  for (const Polyline &shape :
+       {lineShape(Vec3::Zero(), Vec3::UnitX(), 24), ringShape(Vec3::Zero(), Vec3::UnitZ(), 1, 24),
+        helixShape({Vec3::Zero(), Vec3::UnitZ(), Vec3::UnitX(), 1, 0.5, 3, 0, 24})}) {
     Rod rod;
     rod.closed = shape.closed;
     rod.position = shape.points;
@@ -98,7 +99,8 @@ TEST(Grading, NamedVerticesAndCornersStay) {
     const Scene drawn = redraw(scene, drawings, {n});
     EXPECT_LT((drawn.rods[0].position[drawn.forces[0].vertex] - points[13]).norm(), 1e-14);
     EXPECT_LT((drawn.rods[0].position[drawn.supports[1].vertex] - points[41]).norm(), 1e-14);
-    EXPECT_TRUE(std::any_of(drawn.rods[0].position.begin(), drawn.rods[0].position.end(), [&](const Vec3 &x) { return (x - points[30]).norm() < 1e-14; }));
+    EXPECT_TRUE(std::any_of(drawn.rods[0].position.begin(), drawn.rods[0].position.end(),
+                            [&](const Vec3 &x) { return (x - points[30]).norm() < 1e-14; }));
   }
   EXPECT_THROW(redraw(scene, drawings, {5 * multiple + 1}), SceneError);
 }
@@ -119,7 +121,8 @@ TEST(Grading, GoesRoundClosedRods) {
   const Rod &r = drawn.rods[0];
   EXPECT_NEAR(r.edge(0).norm() / r.edge(47).norm(), 1, 1e-3); // both sides of the sharp end are alike
   EXPECT_LT(r.edge(0).norm(), 0.5 * r.edge(12).norm());
-  for (const Vec3 &x : r.position) EXPECT_NEAR(std::hypot(x.x(), 4 * x.y()), 1, 5e-3); // cubics through points 24 degrees apart at the sharp ends
+  for (const Vec3 &x : r.position)
+    EXPECT_NEAR(std::hypot(x.x(), 4 * x.y()), 1, 5e-3); // cubics through points 24 degrees apart at the sharp ends
 }
 
 TEST(Grading, IsSharedByCopies) {
@@ -144,7 +147,8 @@ TEST(Grading, GivenDirectorsKeepTheirTwist) {
   for (int i = 0; i < 24; ++i) rod.director[i] = twisted(rod, i);
   const Scene scene = clampedScene(rod);
   const Rod fine = redraw(scene, graded(scene, curve, true), {96}).rods[0];
-  for (int i = 0; i < 96; ++i) EXPECT_LT((fine.director[i] - twisted(fine, i)).norm(), 1e-3); // h^2/8 of an edge as written
+  for (int i = 0; i < 96; ++i)
+    EXPECT_LT((fine.director[i] - twisted(fine, i)).norm(), 1e-3); // h^2/8 of an edge as written
 }
 
 TEST(Grading, TangentsOfSupportsAreOfSecondOrder) {
@@ -154,7 +158,8 @@ TEST(Grading, TangentsOfSupportsAreOfSecondOrder) {
     const std::vector<Drawing> drawings = graded(scene, parabola(24).curve);
     const double x = 7.0 / 24;
     const Vec3 exact = Vec3(1, 4 * x, 0).normalized();
-    return (redraw(scene, drawings, {factor * edgeMultiple(scene, drawings[0], 0)}).supports[1].frame.tangent - exact).norm();
+    return (redraw(scene, drawings, {factor * edgeMultiple(scene, drawings[0], 0)}).supports[1].frame.tangent - exact)
+        .norm();
   };
   EXPECT_GT(order(error(8), error(16)), 1.9);
 }

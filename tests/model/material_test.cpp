@@ -21,7 +21,8 @@ TEST(Section, CircleAndEllipseInClosedForm) {
 
   const SectionConstants round = sectionConstants({SectionShape::ellipse, {r, r}});
   EXPECT_NEAR(round.torsion, c.torsion, rounding * c.torsion);
-  // Semi-axes 2 and 1: I1 = pi a b^3/4 about the first director (the long axis), I2 = pi a^3 b/4, J = pi a^3 b^3/(a^2 + b^2).
+  // Semi-axes 2 and 1: I1 = pi a b^3/4 about the first director (the long axis), I2 = pi a^3 b/4, J = pi a^3 b^3/(a^2 +
+  // b^2).
   const SectionConstants e = sectionConstants({SectionShape::ellipse, {2, 1}});
   EXPECT_NEAR(e.area, 2 * pi, rounding * e.area);
   EXPECT_NEAR(e.second_moment[0], pi / 2, rounding);
@@ -67,10 +68,12 @@ TEST(Material, OnlyARodWithoutAnyBendingIsACable) {
   EXPECT_TRUE(m.isCable());
 }
 
-/// The inertia of twist is that of the section's area about its middle, not its torsion constant: they differ but for circles.
+/// The inertia of twist is that of the section's area about its middle, not its torsion constant: they differ but for
+/// circles.
 TEST(Material, RotationalInertiaIsThatOfTheSecondMoments) {
   const Material flat = homogeneousMaterial({SectionShape::rectangle, {0.03, 0.002}}, 1e9, 4e8, 1100);
-  EXPECT_NEAR(flat.linear_rotational_inertia, 1100 * 0.03 * 0.002 * (0.03 * 0.03 + 0.002 * 0.002) / 12, 1e-12 * flat.linear_density);
+  EXPECT_NEAR(flat.linear_rotational_inertia, 1100 * 0.03 * 0.002 * (0.03 * 0.03 + 0.002 * 0.002) / 12,
+              1e-12 * flat.linear_density);
 }
 
 TEST(Section, HalfAxesLieAlongTheDirectors) {

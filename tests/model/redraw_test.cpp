@@ -18,7 +18,8 @@ TEST(Redraw, VerticesSupportsAndForcesKeepTheirPlaces) {
   scene.forces = {{0, 24, Vec3(0, 0, 1)}, {0, 12, Vec3(1, 0, 0)}};
   const Scene fine = redraw(scene, {drawingOf(shape)}, {48});
   ASSERT_EQ(fine.rods[0].edges(), 48);
-  for (int v = 0; v <= 24; ++v) EXPECT_LT((fine.rods[0].position[2 * v] - scene.rods[0].position[v]).norm(), 1e-14); // rounding
+  for (int v = 0; v <= 24; ++v)
+    EXPECT_LT((fine.rods[0].position[2 * v] - scene.rods[0].position[v]).norm(), 1e-14); // rounding
   EXPECT_EQ(fine.supports[1].vertex, 32);
   EXPECT_EQ(fine.forces[0].vertex, 48);
   EXPECT_EQ(fine.forces[1].vertex, 24);
@@ -85,7 +86,9 @@ TEST(Redraw, GivenDirectorsKeepTheirTwist) {
   Scene scene = clampedScene(rod);
   const Rod fine = redraw(scene, {{lineShape(Vec3::Zero(), Vec3::UnitX(), 8).curve, true}}, {16}).rods[0];
   for (int i = 0; i < 16; ++i) // the middle of edge i lies at (i + 1/2)/2 edges
-    EXPECT_LT((fine.director[i] - rotateAbout<double>(Vec3::UnitY(), Vec3::UnitX(), per_edge * (0.5 * (i + 0.5) - 0.5))).norm(), 1e-14);
+    EXPECT_LT((fine.director[i] - rotateAbout<double>(Vec3::UnitY(), Vec3::UnitX(), per_edge * (0.5 * (i + 0.5) - 0.5)))
+                  .norm(),
+              1e-14);
 }
 
 /// Tip of a clamped rod of unit length under a couple on one of its 10 edges, with `factor` times as many.
@@ -103,15 +106,16 @@ TEST(Redraw, CouplesGiveACleanSeries) {
   for (const int edge : {0, 4, 8, 9})        // at the clamp, inside, by the end, and as an end couple
     for (const double torque : {0.0, 0.5}) { // one by one: with both, Newton stops where its linear convergence lets it
       const Vec3 couple = torque == 0 ? Vec3(0.3, 0.8, 1) : Vec3::Zero();
-      const Vec3 x1 = tipUnderCouple(edge, couple, torque, 1), x2 = tipUnderCouple(edge, couple, torque, 2), x4 = tipUnderCouple(edge, couple, torque, 4);
+      const Vec3 x1 = tipUnderCouple(edge, couple, torque, 1), x2 = tipUnderCouple(edge, couple, torque, 2),
+                 x4 = tipUnderCouple(edge, couple, torque, 4);
       const Vec3 limit = x4 + (x4 - x2) / 3;
       EXPECT_NEAR(order((x1 - x2).norm(), (x2 - x4).norm()), 2, 0.1) << edge << " " << torque;
       EXPECT_LT((x2 + (x2 - x1) / 3 - limit).norm(), 0.05 * (x2 - limit).norm()) << edge << " " << torque;
     }
 }
 
-/// Tip of a parabola under a couple on one of its 12 edges as written, graded, with `edges`; clamped where it is straightest, for a clamp on a curved rod
-/// that is twisted has a cubic term.
+/// Tip of a parabola under a couple on one of its 12 edges as written, graded, with `edges`; clamped where it is
+/// straightest, for a clamp on a curved rod that is twisted has a cubic term.
 Vec3 tipOfParabola(int edge, const Vec3 &couple, double torque, int edges) {
   const Curve curve = [](double s) { return Vec3(1 - s, 2 * (1 - s) * (1 - s), 0); };
   std::vector<Vec3> points;
@@ -133,7 +137,8 @@ TEST(Redraw, CouplesOnGradedEdgesGiveACleanSeries) {
   for (const int edge : {1, 5, 8}) // a place of its own among the graded edges
     for (const double torque : {0.0, 0.2}) {
       const Vec3 couple = torque == 0 ? Vec3(0.05, 0.1, 0.2) : Vec3::Zero();
-      const Vec3 x1 = tipOfParabola(edge, couple, torque, 34), x2 = tipOfParabola(edge, couple, torque, 68), x4 = tipOfParabola(edge, couple, torque, 136);
+      const Vec3 x1 = tipOfParabola(edge, couple, torque, 34), x2 = tipOfParabola(edge, couple, torque, 68),
+                 x4 = tipOfParabola(edge, couple, torque, 136);
       const Vec3 limit = x4 + (x4 - x2) / 3;
       EXPECT_NEAR(order((x1 - x2).norm(), (x2 - x4).norm()), 2, 0.1) << edge << " " << torque;
       EXPECT_LT((x2 + (x2 - x1) / 3 - limit).norm(), 0.05 * (x2 - limit).norm()) << edge << " " << torque;
@@ -153,12 +158,16 @@ double prolongedError(int edges) {
   EXPECT_EQ(b.setUp(redraw(scene, drawings, {2 * edges}), statics()), PetscErrorCode(0));
   const State state = prolonged(a.state, a.scene, *a.elements, b.scene, *b.elements);
   double worst = 0;
-  for (std::size_t v = 0; v < state.position.size(); ++v) worst = std::max(worst, (state.position[v] - b.state.position[v]).norm());
-  for (std::size_t e = 0; e < state.director.size(); ++e) EXPECT_LT((state.director[e] - b.state.director[e]).norm(), 1e-3);
+  for (std::size_t v = 0; v < state.position.size(); ++v)
+    worst = std::max(worst, (state.position[v] - b.state.position[v]).norm());
+  for (std::size_t e = 0; e < state.director.size(); ++e)
+    EXPECT_LT((state.director[e] - b.state.director[e]).norm(), 1e-3);
   return worst;
 }
 
-TEST(Prolonged, GradedEdgesAreCutWhereTheyAreAtRest) { EXPECT_NEAR(order(prolongedError(32), prolongedError(64)), 4, 0.5); } // in their middles, 2
+TEST(Prolonged, GradedEdgesAreCutWhereTheyAreAtRest) {
+  EXPECT_NEAR(order(prolongedError(32), prolongedError(64)), 4, 0.5);
+} // in their middles, 2
 
 TEST(Prolonged, TwistKeepsItsWholeTurns) {
   for (const Support::Kind kind : {Support::Kind::clamp, Support::Kind::fix_twist}) {
@@ -172,7 +181,8 @@ TEST(Prolonged, TwistKeepsItsWholeTurns) {
     EXPECT_PETSC(a.setUp(scene, statics()));
     EXPECT_PETSC(b.setUp(fine, statics()));
     b.state = prolonged(a.state, a.scene, *a.elements, b.scene, *b.elements);
-    const double coarse = energyBudget(a.scene, *a.elements, a.state, 1).twist, energy = energyBudget(b.scene, *b.elements, b.state, 1).twist;
+    const double coarse = energyBudget(a.scene, *a.elements, a.state, 1).twist,
+                 energy = energyBudget(b.scene, *b.elements, b.state, 1).twist;
     EXPECT_GT(coarse, 100);
     EXPECT_NEAR(energy, coarse, 0.2 * coarse); // a lost turn of a cell would be more than a third of it
   }

@@ -22,7 +22,9 @@ Rod bentRing(int edges) {
   return rod;
 }
 
-double angleOver(const Rod &rod, int from, int to) { return halfAngleBetween(referenceFrame(rod, from), referenceFrame(rod, to)).angle(); }
+double angleOver(const Rod &rod, int from, int to) {
+  return halfAngleBetween(referenceFrame(rod, from), referenceFrame(rod, to)).angle();
+}
 
 TEST(BishopFrames, OfAnOpenRodDoNotTwist) {
   Rod rod;
@@ -74,9 +76,11 @@ TEST(BishopFrames, OfAPlaneRingHaveNoTwist) {
 TEST(FrameAtVertex, ExtrapolatesACircleToItsEndTangentAtSecondOrder) {
   auto error = [](int edges) {
     std::vector<Vec3> points;
-    for (int i = 0; i <= edges; ++i) points.emplace_back(std::sin(double(i) / edges), 1 - std::cos(double(i) / edges), 0);
+    for (int i = 0; i <= edges; ++i)
+      points.emplace_back(std::sin(double(i) / edges), 1 - std::cos(double(i) / edges), 0);
     const Rod rod = inextensibleRod(points);
-    return (frameAtVertex(rod, 0).tangent - Vec3::UnitX()).norm() + (frameAtVertex(rod, edges).tangent - Vec3(std::cos(1), std::sin(1), 0)).norm();
+    return (frameAtVertex(rod, 0).tangent - Vec3::UnitX()).norm() +
+           (frameAtVertex(rod, edges).tangent - Vec3(std::cos(1), std::sin(1), 0)).norm();
   };
   EXPECT_GE(order(error(20), error(40)), 1.9); // on a circle even the h^2 term cancels
   const Rod straight = straightRod(3);

@@ -1,8 +1,8 @@
 /// What takes long is told, what is fast is not.
 #include "support/rods.hpp"
 
-#include "tendril/dynamics/arc_length.hpp"
 #include "tendril/accuracy/estimate.hpp"
+#include "tendril/dynamics/arc_length.hpp"
 #include "tendril/solver/activity.hpp"
 
 #include <algorithm>
@@ -51,7 +51,8 @@ TEST(Watch, WaitsBetweenLines) {
   const auto again = Watch::Clock::now();
   const Doing within([](std::ostream &out) { out << "inside"; });
   while (Watch::Clock::now() - again < std::chrono::milliseconds(30)) watch().beat();
-  if (Watch::Clock::now() - again < std::chrono::milliseconds(45)) EXPECT_TRUE(listener.lines.empty()); // unless the machine held the test up
+  if (Watch::Clock::now() - again < std::chrono::milliseconds(45))
+    EXPECT_TRUE(listener.lines.empty()); // unless the machine held the test up
   while (Watch::Clock::now() - again < std::chrono::milliseconds(220)) watch().beat();
   EXPECT_GE(listener.lines.size(), 1u);
   EXPECT_LE(listener.lines.size(), 1 + std::size_t((Watch::Clock::now() - again) / std::chrono::milliseconds(50)));
@@ -68,7 +69,8 @@ TEST(Watch, TellsWhatIsGoingOn) {
     runTo(sim, scene, statics(10));
     EXPECT_TRUE(listener.heard({"load step at factor 0 of 1, increment 0.1", newton, "times what is asked for"}));
     EXPECT_TRUE(listener.heard({"load step at factor ", "a critical load is searched for; " + newton}));
-    EXPECT_TRUE(listener.heard({"load step at factor ", newton, "a way down from an unstable equilibrium is looked for"}));
+    EXPECT_TRUE(
+        listener.heard({"load step at factor ", newton, "a way down from an unstable equilibrium is looked for"}));
     EXPECT_EQ(Activity::all(), "");
   }
   { // coarse levels of fine rods

@@ -24,7 +24,8 @@ void addRods(Scene &scene, const std::vector<int> &rods) {
   for (const int n : rods) {
     const int count = std::abs(n);
     std::vector<Vec3> points;
-    for (int i = 0; i < count; ++i) points.push_back(n < 0 ? Vec3(std::cos(2 * pi * i / count), std::sin(2 * pi * i / count), 0) : Vec3(i, 0, 0));
+    for (int i = 0; i < count; ++i)
+      points.push_back(n < 0 ? Vec3(std::cos(2 * pi * i / count), std::sin(2 * pi * i / count), 0) : Vec3(i, 0, 0));
     Rod rod = inextensibleRod(points);
     rod.closed = n < 0;
     if (rod.closed) setBishopDirectors(rod);
@@ -40,7 +41,8 @@ Eigen::RowVectorXd rowOf(const Problem &p, std::vector<std::pair<PetscInt, doubl
   return row;
 }
 
-/// Fills the blocks with what vertices, edges and cells could put there, and the dense matrix with the same by the definition of the variables.
+/// Fills the blocks with what vertices, edges and cells could put there, and the dense matrix with the same by the
+/// definition of the variables.
 void fill(Problem &p, double diagonal, double spread = 1) {
   Random random(3);
   p.blocks = EdgeBlocks(p.dofs.slots());
@@ -60,15 +62,18 @@ void fill(Problem &p, double diagonal, double spread = 1) {
     };
     for (int i = 0; i < rod.edges; ++i)
       for (int r = 0; r < edge_size; ++r)
-        for (int c = r; c < edge_size; ++c) put(EdgeBlocks::own(r, c), i, spread * random() + (r == c ? diagonal : 0), edge(i, r), edge(i, c), r == c);
+        for (int c = r; c < edge_size; ++c)
+          put(EdgeBlocks::own(r, c), i, spread * random() + (r == c ? diagonal : 0), edge(i, r), edge(i, c), r == c);
     for (int i = 1; i < rod.edges + (rod.closed ? 1 : 0); ++i)
       for (int r = 0; r < edge_size; ++r)
-        for (int c = 0; c < edge_size; ++c) put(EdgeBlocks::across(r, c), i, spread * random(), edge(i - 1, r), edge(i, c), false);
+        for (int c = 0; c < edge_size; ++c)
+          put(EdgeBlocks::across(r, c), i, spread * random(), edge(i - 1, r), edge(i, c), false);
     for (int i = 0; i < rod.vertices; ++i)
       for (int r = 0; r < 3; ++r)
         for (int c = r; c < 3; ++c) {
           auto position = [&](int k) { return rowOf(p, {{p.dofs.unknown(rod.slot(i), k), 1}}); };
-          put(EdgeBlocks::vertex(r, c), i, spread * random() + (r == c ? diagonal : 0), position(r), position(c), r == c);
+          put(EdgeBlocks::vertex(r, c), i, spread * random() + (r == c ? diagonal : 0), position(r), position(c),
+              r == c);
         }
   }
   for (const RodRange &rod : p.dofs.rods())
@@ -79,13 +84,16 @@ void fill(Problem &p, double diagonal, double spread = 1) {
   p.system = {&p.dofs, p.dofs.all(), &p.blocks, &p.metric, &p.wanted, &p.shift};
 }
 
-int negativeEigenvalues(const Eigen::MatrixXd &a) { return int((Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(a).eigenvalues().array() < 0).count()); }
+int negativeEigenvalues(const Eigen::MatrixXd &a) {
+  return int((Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(a).eigenvalues().array() < 0).count());
+}
 
 void expectSolvesAndCounts(const std::vector<int> &rods, double diagonal, bool held = true) {
   Problem p;
   addRods(p.scene, rods);
   if (held) p.scene.supports = {hold(p.scene, 0, 0, Support::Kind::pin), hold(p.scene, 0, 3, Support::Kind::pin)};
-  if (held && p.scene.rods[0].vertices() > 9) p.scene.supports.push_back(hold(p.scene, 0, 4, Support::Kind::pin)); // an edge held at both ends
+  if (held && p.scene.rods[0].vertices() > 9)
+    p.scene.supports.push_back(hold(p.scene, 0, 4, Support::Kind::pin)); // an edge held at both ends
   ASSERT_EQ(p.dofs.setUp(p.scene), PetscErrorCode(0));
   fill(p, diagonal);
   BandedWorkspace workspace;
@@ -115,7 +123,8 @@ TEST(Banded, SolvesChainsRingsAndSetsOfThem) {
   }
 }
 
-/// More rods of one shape than lanes, so that some are factored in packs, some in a pack that is not full, and some alone.
+/// More rods of one shape than lanes, so that some are factored in packs, some in a pack that is not full, and some
+/// alone.
 TEST(Banded, SolvesManyRodsOfOneShape) {
   for (const int shape : {7, -9}) expectSolvesAndCounts(std::vector<int>(2 * lanes + 5, shape), 3.0);
   std::vector<int> mixed(lanes + 1, 6);
@@ -123,7 +132,8 @@ TEST(Banded, SolvesManyRodsOfOneShape) {
   expectSolvesAndCounts(mixed, -1.0);
 }
 
-/// Held vertices anywhere, two in a row and on both sides of the seam of a ring too; rods held alike share a pack, others do not.
+/// Held vertices anywhere, two in a row and on both sides of the seam of a ring too; rods held alike share a pack,
+/// others do not.
 TEST(Banded, SolvesWhateverIsHeld) {
   for (const int shape : {6, -6})
     for (int pattern = 0; pattern < 64; ++pattern) {
@@ -131,7 +141,8 @@ TEST(Banded, SolvesWhateverIsHeld) {
       addRods(p.scene, std::vector<int>(lanes + 1, shape));
       for (int r = 0; r <= lanes; ++r)
         for (int v = 0; v < 6; ++v)
-          if ((r == 1 ? 63 - pattern : pattern) >> v & 1) p.scene.supports.push_back(hold(p.scene, r, v, Support::Kind::pin));
+          if ((r == 1 ? 63 - pattern : pattern) >> v & 1)
+            p.scene.supports.push_back(hold(p.scene, r, v, Support::Kind::pin));
       ASSERT_EQ(p.dofs.setUp(p.scene), PetscErrorCode(0));
       fill(p, 12);
       for (int r = 0; r <= lanes; ++r) { // shifts of some rods, by a metric that differs from place to place
@@ -140,7 +151,8 @@ TEST(Banded, SolvesWhateverIsHeld) {
         for (int i = 0; i < rod.vertices; ++i)
           for (int a = 0; a < slot_size; ++a) {
             p.metric[a][rod.slot(i)] = a < 3 ? 1 + i : 0.5 + i;
-            if (const PetscInt u = p.dofs.unknown(rod.slot(i), a); u >= 0) p.dense(u, u) += p.shift[r] * p.metric[a][rod.slot(i)];
+            if (const PetscInt u = p.dofs.unknown(rod.slot(i), a); u >= 0)
+              p.dense(u, u) += p.shift[r] * p.metric[a][rod.slot(i)];
           }
       }
       BandedWorkspace workspace;
@@ -177,7 +189,8 @@ TEST(EdgeBlocks, MultiplyAsTheirDefinitionSays) {
   }
 }
 
-/// A cantilever of unit bending stiffness under a tip load, as a chain of edges that springs couple: a solve keeps its digits however short the edges are.
+/// A cantilever of unit bending stiffness under a tip load, as a chain of edges that springs couple: a solve keeps its
+/// digits however short the edges are.
 TEST(Banded, KeepsItsDigitsOnFineMeshes) {
   for (const int edges : {100, 10000, 1000000}) {
     Problem p;
@@ -193,7 +206,10 @@ TEST(Banded, KeepsItsDigitsOnFineMeshes) {
     const double h = 1.0 / edges, cell = 1 / (h * h * h);
     for (int i = 0; i < edges; ++i) {
       for (int a = 0; a < 3; ++a) {
-        p.blocks.entry(rod, EdgeBlocks::own(a, a))[i] = i == 0 ? 3 * cell : i + 1 < edges ? 2 * cell : cell; // the clamp's half cell is twice as stiff
+        p.blocks.entry(rod, EdgeBlocks::own(a, a))[i] = i == 0 ? 3 * cell
+                                                        : i + 1 < edges
+                                                            ? 2 * cell
+                                                            : cell; // the clamp's half cell is twice as stiff
         if (i > 0) p.blocks.entry(rod, EdgeBlocks::across(a, a))[i] = -cell;
       }
       p.blocks.entry(rod, EdgeBlocks::own(3, 3))[i] = 1;
@@ -205,7 +221,8 @@ TEST(Banded, KeepsItsDigitsOnFineMeshes) {
     b[tip] = 1;
     banded.factor(p.system);
     banded.solve(b.data(), x.data());
-    // The discrete beam bends by 1/3 (1 + h^2/2). A million roundings of 1e-16 add up to less than 1e-10, in vertex coordinates the first digit is wrong.
+    // The discrete beam bends by 1/3 (1 + h^2/2). A million roundings of 1e-16 add up to less than 1e-10, in vertex
+    // coordinates the first digit is wrong.
     EXPECT_NEAR(x[tip], (1 + 0.5 * h * h) / 3, 1e-10) << edges;
     EXPECT_EQ(banded.negativePivots(0) + banded.zeroPivots(0), 0) << edges;
   }
@@ -261,7 +278,8 @@ TEST(Banded, CountsMotionsWithoutStiffnessAndLeavesThemOut) {
   banded.factor(p.system);
   EXPECT_EQ(banded.negativePivots(0), 0);
   EXPECT_EQ(banded.zeroPivots(0), 1);
-  // Forces in balance have a solution, and it keeps the first vertex where it is; a lone force leaves all but one equation satisfied.
+  // Forces in balance have a solution, and it keeps the first vertex where it is; a lone force leaves all but one
+  // equation satisfied.
   std::vector<double> b(p.dofs.unknowns(), 0.0), x(b);
   auto force = [&](int i) -> double & { return b[p.dofs.unknown(rod.slot(i), 0)]; };
   auto moved = [&](int i) { return x[p.dofs.unknown(rod.slot(i), 0)]; };

@@ -7,7 +7,8 @@
 namespace tendril::test {
 namespace {
 
-/// A rod in space under a couple fixed there, a torque about its tangent, and both in the middle, with their gradient by finite differences.
+/// A rod in space under a couple fixed there, a torque about its tangent, and both in the middle, with their gradient
+/// by finite differences.
 Scene coupleScene() {
   Rod rod = straightRod(12, Measure::angle);
   rod.material.axial_stiffness = 1e4;
@@ -18,8 +19,9 @@ Scene coupleScene() {
   return scene;
 }
 
-/// At an equilibrium the derivative of the forces does not depend on how configurations are told by coordinates: K solved with a random right-hand
-/// side must change the forces by it. The symmetric part alone misses by as much as it changes them.
+/// At an equilibrium the derivative of the forces does not depend on how configurations are told by coordinates: K
+/// solved with a random right-hand side must change the forces by it. The symmetric part alone misses by as much as it
+/// changes them.
 TEST(Circulatory, DirectionSolvesTheWholeDerivative) {
   Simulation sim;
   LoopSettings settings = statics();
@@ -81,8 +83,8 @@ TEST(Circulatory, DirectionSolvesTheWholeDerivative) {
   EXPECT_GT(miss(symmetric), 1e-2);
 }
 
-/// Two coils by a couple out of the plane, in one load step, by Newton's full steps past where the symmetric part is indefinite; the answer is that
-/// of many small steps.
+/// Two coils by a couple out of the plane, in one load step, by Newton's full steps past where the symmetric part is
+/// indefinite; the answer is that of many small steps.
 TEST(Circulatory, CoilsInOneStep) {
   auto tip = [](int steps) {
     Scene scene = clampedScene(straightRod(32, Measure::angle));

@@ -42,10 +42,12 @@ template <int N> struct Dual {
   friend bool operator>(const Dual &a, const Dual &b) { return a.v > b.v; }
 
 private:
-  static Dual combine(const Dual &a, const Dual &b, double f, double fa, double fb, double faa, double fab, double fbb) {
+  static Dual combine(const Dual &a, const Dual &b, double f, double fa, double fb, double faa, double fab,
+                      double fbb) {
     Dual r(f);
     r.g = fa * a.g + fb * b.g;
-    r.h = fa * a.h + fb * b.h + faa * a.g * a.g.transpose() + fbb * b.g * b.g.transpose() + fab * (a.g * b.g.transpose() + b.g * a.g.transpose());
+    r.h = fa * a.h + fb * b.h + faa * a.g * a.g.transpose() + fbb * b.g * b.g.transpose() +
+          fab * (a.g * b.g.transpose() + b.g * a.g.transpose());
     return r;
   }
 };
@@ -54,8 +56,12 @@ template <int N> Dual<N> sqrt(const Dual<N> &x) {
   const double s = std::sqrt(x.v);
   return Dual<N>::chain(x, s, 0.5 / s, -0.25 / (s * x.v));
 }
-template <int N> Dual<N> sin(const Dual<N> &x) { return Dual<N>::chain(x, std::sin(x.v), std::cos(x.v), -std::sin(x.v)); }
-template <int N> Dual<N> cos(const Dual<N> &x) { return Dual<N>::chain(x, std::cos(x.v), -std::sin(x.v), -std::cos(x.v)); }
+template <int N> Dual<N> sin(const Dual<N> &x) {
+  return Dual<N>::chain(x, std::sin(x.v), std::cos(x.v), -std::sin(x.v));
+}
+template <int N> Dual<N> cos(const Dual<N> &x) {
+  return Dual<N>::chain(x, std::cos(x.v), -std::sin(x.v), -std::cos(x.v));
+}
 template <int N> Dual<N> atan(const Dual<N> &x) {
   const double d = 1 / (1 + x.v * x.v);
   return Dual<N>::chain(x, std::atan(x.v), d, -2 * x.v * d * d);

@@ -12,7 +12,9 @@ namespace tendril::test {
 /// A folder that goes away with its object.
 class Folder {
 public:
-  Folder() : path_(std::filesystem::temp_directory_path() / ("tendril_test_" + std::to_string(getpid()))) { std::filesystem::create_directories(path_); }
+  Folder() : path_(std::filesystem::temp_directory_path() / ("tendril_test_" + std::to_string(getpid()))) {
+    std::filesystem::create_directories(path_);
+  }
   Folder(const Folder &) = delete;
   ~Folder() { std::filesystem::remove_all(path_); }
   std::string path(const std::string &name) const { return (path_ / name).string(); }

@@ -40,7 +40,8 @@ inline RandomCell randomCell(Random &random, double fold) {
   c.f0.director = orthonormalised(random.direction(), c.f0.tangent);
   const Vec3 axis = orthonormalised(random.direction(), c.f0.tangent);
   c.f1.tangent = rotateAbout<double>(c.f0.tangent, axis, fold);
-  c.f1.director = rotateAbout<double>(transport<double>(c.f0.director, c.f0.tangent, c.f1.tangent), c.f1.tangent, 2 * random());
+  c.f1.director =
+      rotateAbout<double>(transport<double>(c.f0.director, c.f0.tangent, c.f1.tangent), c.f1.tangent, 2 * random());
   c.f0.length = 1 + 0.5 * random();
   c.f1.length = 1 + 0.5 * random();
   for (int k = 0; k < 3; ++k) {

@@ -12,7 +12,8 @@ namespace tendril::test {
 /// Fails the test when PETSc reports an error.
 #define EXPECT_PETSC(call) ASSERT_EQ((call), PetscErrorCode(0))
 
-/// Rod through points with unit bending stiffness, GJ = 2/3, and EA so large that it does not stretch (EA/EI = 1e10 for length 1).
+/// Rod through points with unit bending stiffness, GJ = 2/3, and EA so large that it does not stretch (EA/EI = 1e10 for
+/// length 1).
 inline Rod inextensibleRod(const std::vector<Vec3> &points, Measure measure = Measure::tan) {
   Rod rod;
   rod.name = "rod";
@@ -27,7 +28,9 @@ inline Rod straightRod(int edges, Measure measure = Measure::tan, double length 
   return inextensibleRod(lineShape(Vec3::Zero(), Vec3(length, 0, 0), edges).points, measure);
 }
 
-inline Support hold(const Scene &scene, int rod, int vertex, Support::Kind kind) { return {kind, rod, vertex, {}, frameAtVertex(scene.rods[rod], vertex)}; }
+inline Support hold(const Scene &scene, int rod, int vertex, Support::Kind kind) {
+  return {kind, rod, vertex, {}, frameAtVertex(scene.rods[rod], vertex)};
+}
 
 /// Scene of one rod, without gravity, clamped at its first vertex.
 inline Scene clampedScene(Rod rod) {

@@ -1,7 +1,8 @@
 #pragma once
 /// \file estimate.hpp
-/// Richardson's estimate of the error of a static answer: every strain, load and support is of second order in the edge length h, so that of the
-/// difference between the answers at h and h/2, 4/3 is the error of the first and 1/3 that of the second.
+/// Richardson's estimate of the error of a static answer: every strain, load and support is of second order in the edge
+/// length h, so that of the difference between the answers at h and h/2, 4/3 is the error of the first and 1/3 that of
+/// the second.
 
 #include "tendril/dynamics/simulation.hpp"
 #include "tendril/model/redraw.hpp"
@@ -40,9 +41,9 @@ struct Estimate {
   std::vector<Vec3> position; ///< extrapolated, of the vertices at h (nv) [m]
   std::vector<double> error;  ///< of the answer at h (nv) [m]
   std::vector<RodEstimate> rods;
-  EnergyBudget energy, energy_error;            ///< at h, signed: the energy less its error is the extrapolated energy [J]
-  bool tan = false;                             ///< some rod measures strains by tan
-  std::string none;                             ///< why the two answers tell nothing; empty when they do
+  EnergyBudget energy, energy_error; ///< at h, signed: the energy less its error is the extrapolated energy [J]
+  bool tan = false;                  ///< some rod measures strains by tan
+  std::string none;                  ///< why the two answers tell nothing; empty when they do
   std::vector<double> critical, critical_error; ///< extrapolated critical load factors, and the errors of those found
   std::string no_critical;                      ///< why there is no estimate of them although some were found
 
@@ -57,16 +58,18 @@ struct Estimate {
 /// \param scene that of `coarse`; `fine` has twice the edges of each rod
 Estimate richardson(const Scene &scene, const Answer &coarse, const Answer &fine);
 
-/// Solves with twice the edges, starting from the answer at hand so that both are on one branch of equilibria; where Newton does not find it from there,
-/// or critical loads were found on the way, by the load steps of the run.
-/// \param rounding_error of the run, over rod lengths
-/// \param fine the scene of `run` redrawn with twice the edges
-PetscErrorCode estimateError(const Simulation &run, double rounding_error, const std::vector<double> &critical, const Scene &fine, const LoopSettings &settings,
-                             Estimate *estimate);
+/// Solves with twice the edges, starting from the answer at hand so that both are on one branch of equilibria; where
+/// Newton does not find it from there, or critical loads were found on the way, by the load steps of the run. \param
+/// rounding_error of the run, over rod lengths \param fine the scene of `run` redrawn with twice the edges
+PetscErrorCode estimateError(const Simulation &run, double rounding_error, const std::vector<double> &critical,
+                             const Scene &fine, const LoopSettings &settings, Estimate *estimate);
 
 /// Energies that have an estimate of their own, by name.
 inline constexpr std::pair<const char *, double EnergyBudget::*> estimated_energies[] = {
-    {"stretch", &EnergyBudget::stretch}, {"bend", &EnergyBudget::bend}, {"twist", &EnergyBudget::twist}, {"gravity", &EnergyBudget::gravity}};
+    {"stretch", &EnergyBudget::stretch},
+    {"bend", &EnergyBudget::bend},
+    {"twist", &EnergyBudget::twist},
+    {"gravity", &EnergyBudget::gravity}};
 
 /// Lines that tell an estimate to a user.
 std::vector<std::string> describe(const Estimate &estimate, const Scene &scene);

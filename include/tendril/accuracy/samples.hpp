@@ -18,27 +18,29 @@ struct Samples {
   /// Edges x steps.
   double work() const;
   /// At the first time only.
-  Samples first() const { return {failure, edges, {position.front()}, {elastic.front()}, rounding_error, steps, seconds}; }
+  Samples first() const {
+    return {failure, edges, {position.front()}, {elastic.front()}, rounding_error, steps, seconds};
+  }
 };
 
-/// Runs a scene in dynamics to its end. Steps have to end at the times; where a rejected step put them off, that is a failure.
-/// \param times increasing [s]
+/// Runs a scene in dynamics to its end. Steps have to end at the times; where a rejected step put them off, that is a
+/// failure. \param times increasing [s]
 PetscErrorCode sample(Scene scene, const LoopSettings &settings, const std::vector<double> &times, Samples *samples);
 
 /// Errors of a rod at places along it, each at the times of the samples.
 using Errors = std::vector<std::vector<Vec3>>;
 
-/// One run less another, per rod, as a Quantity counts: of positions over the rod's length, at the vertices that a rod of `edges` has, or its last one; of the
-/// elastic energy of all rods, over its largest value (one place, first component).
-/// \param scene with these rods, of any edges
-/// \param edges per rod; both runs have as many or multiples
-std::vector<Errors> difference(const Scene &scene, const Samples &run, const Samples &other, const std::vector<int> &edges, Quantity of);
+/// One run less another, per rod, as a Quantity counts: of positions over the rod's length, at the vertices that a rod
+/// of `edges` has, or its last one; of the elastic energy of all rods, over its largest value (one place, first
+/// component). \param scene with these rods, of any edges \param edges per rod; both runs have as many or multiples
+std::vector<Errors> difference(const Scene &scene, const Samples &run, const Samples &other,
+                               const std::vector<int> &edges, Quantity of);
 
 /// The largest root mean square in time of any place.
 double sizeOf(const Errors &errors);
 
-/// How much two errors add up where they are large: 1 when they have the same direction at all times, 0 when they have nothing to do with each other or
-/// make up for each other.
+/// How much two errors add up where they are large: 1 when they have the same direction at all times, 0 when they have
+/// nothing to do with each other or make up for each other.
 double correlation(const Errors &a, const Errors &b);
 
 } // namespace tendril

@@ -1,6 +1,7 @@
 #pragma once
 /// \file arc_length.hpp
-/// Bordered arc-length continuation (Keller 1977; Riks 1979): follows a path of equilibria, stable or not, through limit points of the load.
+/// Bordered arc-length continuation (Keller 1977; Riks 1979): follows a path of equilibria, stable or not, through
+/// limit points of the load.
 
 #include "tendril/dynamics/time_loop.hpp"
 
@@ -18,8 +19,8 @@ public:
 
   CriticalObserver on_critical; ///< told of critical points, before the step that passes them
   std::function<bool()> stops;  ///< as that of TimeLoop
-  /// Follows the path from `state` until the load factor is 1 or the steps are used up. `finished` is false when a step of the smallest length
-  /// failed; `state` is then the last one accepted. Diagnostics' dt is the step along the path.
+  /// Follows the path from `state` until the load factor is 1 or the steps are used up. `finished` is false when a step
+  /// of the smallest length failed; `state` is then the last one accepted. Diagnostics' dt is the step along the path.
   PetscErrorCode run(State &state, const TimeLoop::Observer &observe, bool *finished);
   const std::string &failure() const { return failure_; }
 
@@ -56,15 +57,20 @@ private:
   bool move(const Planes &increment, double factor);
   PetscErrorCode correct(double start, const Point &direction, double length, bool *converged);
   PetscErrorCode correctAt(double factor, bool *converged);
-  PetscErrorCode iterate(const std::function<double(const Point &moved, const Point &residual, const Point &load)> &constraint, double start, bool *converged);
+  PetscErrorCode
+  iterate(const std::function<double(const Point &moved, const Point &residual, const Point &load)> &constraint,
+          double start, bool *converged);
   PetscErrorCode begin(const State &state, Point *direction);
   PetscErrorCode countNeutral(double little, int *count);
   PetscErrorCode refuseFreeStart(const State &state);
   PetscErrorCode refine(State &state, Point *direction, bool *refined);
   PetscErrorCode step(const State &state, double length, bool *converged, const Point *along = nullptr);
-  PetscErrorCode locateLimit(const State &start, const Point &before, const std::array<double, 2> &slopes, double length, std::vector<CriticalPoint> *located);
-  PetscErrorCode locateBifurcation(const State &start, const State &end, const Point &before, double length, std::vector<CriticalPoint> *located);
-  PetscErrorCode switchBranch(const CriticalPoint &critical, double length, double shortest, State *state, bool *switched);
+  PetscErrorCode locateLimit(const State &start, const Point &before, const std::array<double, 2> &slopes,
+                             double length, std::vector<CriticalPoint> *located);
+  PetscErrorCode locateBifurcation(const State &start, const State &end, const Point &before, double length,
+                                   std::vector<CriticalPoint> *located);
+  PetscErrorCode switchBranch(const CriticalPoint &critical, double length, double shortest, State *state,
+                              bool *switched);
 };
 
 } // namespace tendril

@@ -17,7 +17,8 @@ struct Diagnostics {
   double dissipated = 0; ///< by the step: the fall of the energies, and the work [J]
   int newton_iterations = 0, line_search_trials = 0, negative_pivots = 0, rejected_steps = 0;
   double wall_seconds = 0;
-  double rounding_error = 0;   ///< what rounding keeps from the answer, over rod lengths; in dynamics summed over the steps (NewtonReport)
+  double rounding_error =
+      0; ///< what rounding keeps from the answer, over rod lengths; in dynamics summed over the steps (NewtonReport)
   int rejected_iterations = 0; ///< Newton iterations of the rejected steps, which newton_iterations leaves out
   double error_estimate = 0;   ///< errors of all steps so far, each over the rod length, added up; 0 when not computed
 };

@@ -14,8 +14,8 @@ namespace tendril {
 
 /// Statics: steps of the load factor, or of the arc length of the path of equilibria (ArcLength).
 enum class Continuation { load, arclength };
-/// What to do where stability changes along a path: nothing; locate the critical load and go on; end the run there; or go on from there along the branch
-/// that leaves in the direction of the critical mode.
+/// What to do where stability changes along a path: nothing; locate the critical load and go on; end the run there; or
+/// go on from there along the branch that leaves in the direction of the critical mode.
 enum class Bifurcation { off, locate, stop, switch_branch };
 
 /// Dynamics: steps as given, or as long as the error of a step allows.
@@ -46,7 +46,8 @@ struct StepControl {
   double error = 0;        ///< adapted steps: of the last one, over what is allowed; 0 where unknown
   double error_sum = 0;    ///< of all steps, over rod lengths
   double rounding_sum = 0; ///< of all steps, over rod lengths
-  double energy = NAN;     ///< at the end of the last step, from which the next one dissipates; NAN where there was none [J]
+  double energy =
+      NAN; ///< at the end of the last step, from which the next one dissipates; NAN where there was none [J]
 };
 
 /// Takes steps and tells the observer of each one accepted.
@@ -55,10 +56,13 @@ public:
   using Observer = std::function<PetscErrorCode(const State &, const Diagnostics &)>;
   StepControl control;
   CriticalObserver on_critical; ///< told of each critical point, before the step beyond it
-  std::function<bool()> stops;  ///< asked after each step whether to end there: `finished` is false then, and failure() is empty
-  TimeLoop(StepSolver &solver, const LoopSettings &settings) : solver_(solver), settings_(settings), integrator_(makeIntegrator(settings.integrator)) {}
+  std::function<bool()>
+      stops; ///< asked after each step whether to end there: `finished` is false then, and failure() is empty
+  TimeLoop(StepSolver &solver, const LoopSettings &settings)
+      : solver_(solver), settings_(settings), integrator_(makeIntegrator(settings.integrator)) {}
 
-  /// Advances `state` to the end. `finished` is false when dt_min was reached; `state` is then the last one accepted, bit for bit.
+  /// Advances `state` to the end. `finished` is false when dt_min was reached; `state` is then the last one accepted,
+  /// bit for bit.
   PetscErrorCode run(State &state, const Observer &observe, bool *finished);
   /// The step of length `dt` [s, or load factor] that follows a state.
   static Step stepOf(const LoopSettings &settings, const State &state, double dt);
@@ -75,7 +79,8 @@ private:
   std::vector<int> moving_;             ///< supports
   std::vector<SupportActions> actions_; ///< of those, at each stage of the step under way
 
-  /// Error of the step under way, and what it moved: the largest of any rod, root mean square over its length [turns in rad].
+  /// Error of the step under way, and what it moved: the largest of any rod, root mean square over its length [turns in
+  /// rad].
   struct StepError {
     double error = 0, moved = 0;
     bool known = false;

@@ -1,8 +1,9 @@
 #pragma once
 /// \file bend_twist.hpp
-/// Bending and twisting energy of one cell: the two edge frames that meet at a vertex, or an edge and the fixed frame of a clamp
-/// (the half cell). Discrete curvature binormal after Bergou et al., "Discrete Elastic Rods" (2008), section 4.2; second derivatives
-/// built from those of Bergou et al., "Discrete Viscous Threads" (2010), appendix, for the normalised mean director. docs/theory.md derives them.
+/// Bending and twisting energy of one cell: the two edge frames that meet at a vertex, or an edge and the fixed frame
+/// of a clamp (the half cell). Discrete curvature binormal after Bergou et al., "Discrete Elastic Rods" (2008),
+/// section 4.2; second derivatives built from those of Bergou et al., "Discrete Viscous Threads" (2010), appendix, for
+/// the normalised mean director. docs/theory.md derives them.
 
 #include "tendril/model/strain.hpp"
 
@@ -12,8 +13,8 @@ namespace tendril {
 
 /// Unknowns of a cell in the order x_{i-1}, theta_{i-1}, x_i, theta_i, x_{i+1}.
 inline constexpr int cell_size = 11;
-/// Edge variables of a cell in the order e_{i-1}, theta_{i-1}, e_i, theta_i, of which its energy is a function; entries of the upper triangle of
-/// the Hessian over them, row by row.
+/// Edge variables of a cell in the order e_{i-1}, theta_{i-1}, e_i, theta_i, of which its energy is a function; entries
+/// of the upper triangle of the Hessian over them, row by row.
 inline constexpr int cell_variables = 8, cell_pairs = cell_variables * (cell_variables + 1) / 2;
 
 template <class T> struct CellDerivatives {
@@ -42,29 +43,37 @@ template <class T> Matrix3<T> crossMatrix(const Vector3<T> &v) {
 }
 
 /// Gradient of a cell's energy over its unknowns alone (see cellDerivatives).
-template <Measure measure, class T> std::array<T, cell_size> cellGradient(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell) {
+template <Measure measure, class T>
+std::array<T, cell_size> cellGradient(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell) {
   const CellGeometry<T> g = cellGeometry(f0, f1, cell);
   const Vector3<T> &t0 = f0.tangent, &t1 = f1.tangent;
   const T i0 = cell.free[0] / f0.length, i1 = cell.free[1] / f1.length;
   AngleFactor<T> a{T(1.0), T(0.0), T(0.0)};
   if constexpr (measure == Measure::angle) a = angleFactor<T>((g.kappa1 * g.kappa1 + g.kappa2 * g.kappa2) * T(0.25));
-  const T force1 = cell.stiffness[0] * (g.stretch * a.value * g.kappa1 - cell.rest[0]), force2 = cell.stiffness[1] * (g.stretch * a.value * g.kappa2 - cell.rest[1]);
+  const T force1 = cell.stiffness[0] * (g.stretch * a.value * g.kappa1 - cell.rest[0]),
+          force2 = cell.stiffness[1] * (g.stretch * a.value * g.kappa2 - cell.rest[1]);
   const T along = force1 * g.kappa1 + force2 * g.kappa2, turning = T(0.5) * a.first * along;
-  const T f1st = g.stretch * (force1 * a.value + turning * g.kappa1), f2nd = g.stretch * (force2 * a.value + turning * g.kappa2);
+  const T f1st = g.stretch * (force1 * a.value + turning * g.kappa1),
+          f2nd = g.stretch * (force2 * a.value + turning * g.kappa2);
   const std::array<T, 3> twist = twistMeasure<measure>(g.half, cell);
   const T f_twist = cell.stiffness[2] * (twist[0] - cell.rest[2]) * twist[1];
   // Moving the directors turns p = f1 d1 + f2 d2 with the first frame, and within it by half the twist.
   const Vector3<T> p = g.d1 * f1st + g.d2 * f2nd, mean = (t0 + t1) / g.chi;
-  const T bp = g.binormal.dot(p), turn = f1st * g.kappa2 - f2nd * g.kappa1, two_over_chi = T(2.0) / g.chi, half_twist = T(0.5) * f_twist + T(0.25) * turn;
-  const Vector3<T> e0 = (t1.cross(p) * two_over_chi - mean * bp) * i0 + g.binormal * (half_twist * i0) + t0 * (a.value * along * cell.weight[0] * cell.free[0]);
-  const Vector3<T> e1 = (t0.cross(p) * two_over_chi + mean * bp) * (-i1) + g.binormal * (half_twist * i1) + t1 * (a.value * along * cell.weight[1] * cell.free[1]);
+  const T bp = g.binormal.dot(p), turn = f1st * g.kappa2 - f2nd * g.kappa1, two_over_chi = T(2.0) / g.chi,
+          half_twist = T(0.5) * f_twist + T(0.25) * turn;
+  const Vector3<T> e0 = (t1.cross(p) * two_over_chi - mean * bp) * i0 + g.binormal * (half_twist * i0) +
+                        t0 * (a.value * along * cell.weight[0] * cell.free[0]);
+  const Vector3<T> e1 = (t0.cross(p) * two_over_chi + mean * bp) * (-i1) + g.binormal * (half_twist * i1) +
+                        t1 * (a.value * along * cell.weight[1] * cell.free[1]);
   const T theta0 = (T(0.5) * turn - f_twist) * cell.free[0], theta1 = (T(0.5) * turn + f_twist) * cell.free[1];
   return {-e0[0], -e0[1], -e0[2], theta0, e0[0] - e1[0], e0[1] - e1[1], e0[2] - e1[2], theta1, e1[0], e1[1], e1[2]};
 }
 
-/// Gradient over the unknowns of a cell, and Hessian over its edge variables, pulled back by the retraction at the current frames: exact and symmetric.
-/// Each number goes to `out` once, by putGradient(r, value) or, for r <= c, putHessian(r, c, value).
-template <Measure measure, class T, class Out> void cellDerivatives(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell, Out &&out) {
+/// Gradient over the unknowns of a cell, and Hessian over its edge variables, pulled back by the retraction at the
+/// current frames: exact and symmetric. Each number goes to `out` once, by putGradient(r, value) or, for r <= c,
+/// putHessian(r, c, value).
+template <Measure measure, class T, class Out>
+void cellDerivatives(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell, Out &&out) {
   const CellGeometry<T> g = cellGeometry(f0, f1, cell);
   const Vector3<T> &t0 = f0.tangent, &t1 = f1.tangent, &b = g.binormal;
   const T i0 = cell.free[0] / f0.length, i1 = cell.free[1] / f1.length;
@@ -96,12 +105,14 @@ template <Measure measure, class T, class Out> void cellDerivatives(const FrameO
   if constexpr (measure == Measure::angle)
     for (int j = 0; j < 2; ++j)
       for (int k = 0; k < 2; ++k) {
-        T v = T(0.5) * a.first * (force[j] * kappa[k] + force[k] * kappa[j]) + T(0.25) * a.second * along * kappa[j] * kappa[k];
+        T v = T(0.5) * a.first * (force[j] * kappa[k] + force[k] * kappa[j]) +
+              T(0.25) * a.second * along * kappa[j] * kappa[k];
         if (j == k) v = v + T(0.5) * a.first * along;
         f2nd[j][k] = f2nd[j][k] + g.stretch * v;
       }
   const T f_stretch = a.value * along;
-  const T f_stretch2 = a.value * a.value * (cell.stiffness[0] * kappa[0] * kappa[0] + cell.stiffness[1] * kappa[1] * kappa[1]);
+  const T f_stretch2 =
+      a.value * a.value * (cell.stiffness[0] * kappa[0] * kappa[0] + cell.stiffness[1] * kappa[1] * kappa[1]);
   const std::array<T, 3> twist = twistMeasure<measure>(g.half, cell);
   const T twist_force = cell.stiffness[2] * (twist[0] - cell.rest[2]);
   const T f_twist = twist_force * twist[1];
@@ -117,7 +128,8 @@ template <Measure measure, class T, class Out> void cellDerivatives(const FrameO
   // Gradient of binormal.p for a vector p that moves with the first frame.
   auto directorGradient = [&](const Vector3<T> &p, const T &kp) {
     Vector8 v;
-    v << (t1.cross(p) * two_over_chi - mean * kp) * i0, T(0.0), (t0.cross(p) * two_over_chi + mean * kp) * (-i1), T(0.0);
+    v << (t1.cross(p) * two_over_chi - mean * kp) * i0, T(0.0), (t0.cross(p) * two_over_chi + mean * kp) * (-i1),
+        T(0.0);
     return v;
   };
   kappa_g[0] = directorGradient(g.d1, g.kappa1) + psi_g * g.kappa2;
@@ -125,7 +137,8 @@ template <Measure measure, class T, class Out> void cellDerivatives(const FrameO
 
   const Vector8 gradient = kappa_g[0] * f1st[0] + kappa_g[1] * f1st[1] + twist_g * f_twist + stretch_g * f_stretch;
 
-  // Curvature of the pieces: binormal.p with p = f1 d1 + f2 d2 frozen on the first frame, its turning with psi, twist and stretch.
+  // Curvature of the pieces: binormal.p with p = f1 d1 + f2 d2 frozen on the first frame, its turning with psi, twist
+  // and stretch.
   const Vector3<T> p = g.d1 * f1st[0] + g.d2 * f1st[1];
   const Vector3<T> dp = g.d2 * f1st[0] - g.d1 * f1st[1];
   const T bp = b.dot(p), bdp = b.dot(dp);
@@ -142,13 +155,15 @@ template <Measure measure, class T, class Out> void cellDerivatives(const FrameO
   for (int r = 0; r < 8; ++r)
 #pragma GCC unroll 8
     for (int c = r; c < 8; ++c)
-      h[r][c] = kappa_g[0][r] * u0[c] + kappa_g[1][r] * u1[c] + stretch_g[r] * us[c] + twist_g[r] * ut[c] + psi_g[r] * up[c] + dp_g[r] * psi_g[c];
+      h[r][c] = kappa_g[0][r] * u0[c] + kappa_g[1][r] * u1[c] + stretch_g[r] * us[c] + twist_g[r] * ut[c] +
+                psi_g[r] * up[c] + dp_g[r] * psi_g[c];
 
   const Vector3<T> m2 = p * two_over_chi, m0 = t0.cross(m2), m1 = t1.cross(m2);
   const Vector3<T> two_mean = mean * (T(2.0) * bp);
   const Vector3<T> w0 = (two_mean - m1) * (i0 * i0), w1 = (two_mean + m0) * (i1 * i1);
   const T shift = bp / g.chi;
-  const T s0 = f_stretch * cell.weight[0] * i0 - shift * i0 * i0, s1 = f_stretch * cell.weight[1] * i1 - shift * i1 * i1;
+  const T s0 = f_stretch * cell.weight[0] * i0 - shift * i0 * i0,
+          s1 = f_stretch * cell.weight[1] * i1 - shift * i1 * i1;
   const Vector3<T> q0 = p * (T(0.5) * i0 * i0) - (t0 + mean) * (T(0.25) * i0 * i0 * twist_weight);
   const Vector3<T> q1 = (t1 + mean) * (T(-0.25) * i1 * i1 * twist_weight);
   const Vector3<T> v0 = m1 * (i0 * i0), v1 = m0 * (i1 * i1);
@@ -158,7 +173,8 @@ template <Measure measure, class T, class Out> void cellDerivatives(const FrameO
     for (int c = r; c < 3; ++c) {
       // 2 bp mean mean' - m1 mean' - mean m1', and the like for the second edge; symmetric sums.
       h[r][c] = h[r][c] + w0[r] * mean[c] - mean[r] * v0[c] - t0[r] * t0[c] * s0 + b[r] * q0[c] + q0[r] * b[c];
-      h[4 + r][4 + c] = h[4 + r][4 + c] + w1[r] * mean[c] + mean[r] * v1[c] - t1[r] * t1[c] * s1 + b[r] * q1[c] + q1[r] * b[c];
+      h[4 + r][4 + c] =
+          h[4 + r][4 + c] + w1[r] * mean[c] + mean[r] * v1[c] - t1[r] * t1[c] * s1 + b[r] * q1[c] + q1[r] * b[c];
     }
 #pragma GCC unroll 3
   for (int r = 0; r < 3; ++r) {
@@ -173,13 +189,14 @@ template <Measure measure, class T, class Out> void cellDerivatives(const FrameO
   for (int r = 0; r < 3; ++r)
 #pragma GCC unroll 3
     for (int c = 0; c < 3; ++c) {
-      T v = x0[r] * mean[c] + mean[r] * x1[c] - t0[r] * t1[c] * (shift * i01) + skew(r, c) * i01 - b[r] * mean[c] * (T(0.5) * twist_weight * i01);
+      T v = x0[r] * mean[c] + mean[r] * x1[c] - t0[r] * t1[c] * (shift * i01) + skew(r, c) * i01 -
+            b[r] * mean[c] * (T(0.5) * twist_weight * i01);
       if (r == c) v = v - shift * i01;
       h[r][4 + c] = h[r][4 + c] + v;
     }
 
-  // First what belongs to the first vertex or edge, then what belongs to the second. Neighbouring cells meet in the same memory a slot apart; in this
-  // order a store has left the pipeline before a load needs a part of it.
+    // First what belongs to the first vertex or edge, then what belongs to the second. Neighbouring cells meet in the
+    // same memory a slot apart; in this order a store has left the pipeline before a load needs a part of it.
 #pragma GCC unroll 4
   for (int r = 0; r < 4; ++r) {
     out.putGradient(r, r < 3 ? -gradient[r] : gradient[r]);
@@ -196,10 +213,10 @@ template <Measure measure, class T, class Out> void cellDerivatives(const FrameO
   for (int r = 0; r < 3; ++r) out.putGradient(8 + r, gradient[4 + r]);
 }
 
-/// Derivative of a cell's energy by turning its second frame against its first, about axes fixed in space [N m]: that by turning the one that is free, as
-/// turning both costs nothing.
-/// \param d gradient of the cell
-inline Vec3 cellMoment(const Frame &f0, const Frame &f1, const CellOf<double> &cell, const std::array<double, cell_size> &d) {
+/// Derivative of a cell's energy by turning its second frame against its first, about axes fixed in space [N m]: that
+/// by turning the one that is free, as turning both costs nothing. \param d gradient of the cell
+inline Vec3 cellMoment(const Frame &f0, const Frame &f1, const CellOf<double> &cell,
+                       const std::array<double, cell_size> &d) {
   if (cell.free[1] != 0) return f1.length * f1.tangent.cross(Eigen::Map<const Vec3>(&d[8])) + d[7] * f1.tangent;
   return f0.length * f0.tangent.cross(Eigen::Map<const Vec3>(&d[0])) - d[3] * f0.tangent;
 }

@@ -1,6 +1,7 @@
 #pragma once
 /// \file cell.hpp
-/// Cells of a rod as the kernels of bend_twist.hpp want them: constants, whole turns and strains, one at a time or a pack.
+/// Cells of a rod as the kernels of bend_twist.hpp want them: constants, whole turns and strains, one at a time or a
+/// pack.
 
 #include "tendril/energy/bend_twist.hpp"
 #include "tendril/state/state.hpp"
@@ -35,13 +36,17 @@ template <class T> CellOf<T> cellOf(const Planes &cells, const Configuration &c,
 }
 
 /// Present strains of a cell (or a pack of `count` cells), integrated over it [rad].
-template <class T> std::array<T, 3> presentStrain(const Elements &elements, const Configuration &configuration, int rod, const LooseCell &cell, int count = 1) {
+template <class T>
+std::array<T, 3> presentStrain(const Elements &elements, const Configuration &configuration, int rod,
+                               const LooseCell &cell, int count = 1) {
   const auto [f0, f1] = cellFrames<T>(configuration, cell, count);
   const CellOf<T> constants = cellOf<T>(elements.cells(), configuration, cell.slot);
-  return elements.measure[rod] == Measure::tan ? cellStrain<Measure::tan>(f0, f1, constants) : cellStrain<Measure::angle>(f0, f1, constants);
+  return elements.measure[rod] == Measure::tan ? cellStrain<Measure::tan>(f0, f1, constants)
+                                               : cellStrain<Measure::angle>(f0, f1, constants);
 }
 
-/// Strains of a configuration: a row over slots of the edges' axial ones, and three of the cells', each with room for a pack behind.
+/// Strains of a configuration: a row over slots of the edges' axial ones, and three of the cells', each with room for a
+/// pack behind.
 std::vector<double> strainsOf(const Elements &elements, const Configuration &c);
 inline std::size_t strainRow(const Elements &elements) { return std::size_t(elements.slots) + lanes; }
 

@@ -1,7 +1,7 @@
 #pragma once
 /// \file term.hpp
-/// A term of the incremental potential: its value and its derivatives over the slots of one rod. To add an energy, write one file with a
-/// class derived from Term and add one line to makeTerms (terms.cpp).
+/// A term of the incremental potential: its value and its derivatives over the slots of one rod. To add an energy,
+/// write one file with a class derived from Term and add one line to makeTerms (terms.cpp).
 
 #include "tendril/energy/cell.hpp"
 #include "tendril/state/stage.hpp"
@@ -10,8 +10,9 @@
 
 namespace tendril {
 
-/// Which second derivatives a Hessian holds: all of them; without the compression of edges, which cannot make it indefinite then; or without the
-/// second derivatives of the strains and without compression (what other codes use: slower, never indefinite; for comparison). Or none, where only the gradient is wanted.
+/// Which second derivatives a Hessian holds: all of them; without the compression of edges, which cannot make it
+/// indefinite then; or without the second derivatives of the strains and without compression (what other codes use:
+/// slower, never indefinite; for comparison). Or none, where only the gradient is wanted.
 enum class HessianKind { exact, uncompressed, gauss_newton, none };
 
 /// One step, or stage of one, to be taken: from the start state to `time`.
@@ -22,13 +23,15 @@ struct Step {
   bool mixed = true;      ///< axial force as its own unknown, condensed edge by edge
   HessianKind hessian = HessianKind::exact;
   const StageRule *rule = nullptr; ///< of the stage, with the same dt; null: backward Euler
-  const Configuration *twist_reference = nullptr; ///< frames from which twist is measured (carryFrames); null: those of the start
+  const Configuration *twist_reference =
+      nullptr; ///< frames from which twist is measured (carryFrames); null: those of the start
   double dampingDt() const { return rule ? rule->damping_dt : dt; }
   bool isStatic() const { return dt == 0; }
 };
 
-/// First and second derivatives by x, y, z and twist of each slot (see DofMap). Terms add to `equilibrium`, where the stretching force is the
-/// independent axial force; `gradient`, of the potential itself, differs by the forces that stretch adds there.
+/// First and second derivatives by x, y, z and twist of each slot (see DofMap). Terms add to `equilibrium`, where the
+/// stretching force is the independent axial force; `gradient`, of the potential itself, differs by the forces that
+/// stretch adds there.
 struct Derivatives {
   Planes gradient, equilibrium;
   EdgeBlocks blocks; ///< of the Hessian, over edge variables
@@ -44,7 +47,8 @@ class Term {
 public:
   virtual ~Term() = default;
   /// Called for every rod before the iterations of a step. `start` stays in place until the next.
-  virtual void beginStep(const State & /*state*/, const Configuration & /*start*/, const Step & /*step*/, int /*rod*/) {}
+  virtual void beginStep(const State & /*state*/, const Configuration & /*start*/, const Step & /*step*/, int /*rod*/) {
+  }
   /// Called whenever the iterate of a rod has moved.
   virtual void moveIterate(const Configuration & /*iterate*/, int /*rod*/) {}
   /// Called when the load factor changes within a step.
@@ -54,9 +58,12 @@ public:
   /// [J], up to a constant of the step. Not finite where the configuration is impossible.
   virtual double energy(const Configuration &configuration, int rod) const = 0;
   /// Adds gradient and Hessian, pulled back by the retraction at the configuration.
-  virtual void addDerivatives(const Configuration &configuration, int rod, Derivatives &out, HessianKind hessian = HessianKind::exact) const = 0;
+  virtual void addDerivatives(const Configuration &configuration, int rod, Derivatives &out,
+                              HessianKind hessian = HessianKind::exact) const = 0;
   /// Derivative of the energy by turning the frame of a support, at its slot, about axes fixed in space [N m].
-  virtual Vec3 momentOn(const Configuration & /*configuration*/, int /*rod*/, int /*frame*/) const { return Vec3::Zero(); }
+  virtual Vec3 momentOn(const Configuration & /*configuration*/, int /*rod*/, int /*frame*/) const {
+    return Vec3::Zero();
+  }
 };
 
 /// The same of the half cells beside a frame. \param cells their constants, as Elements::cells()
@@ -66,11 +73,13 @@ Vec3 momentOn(const Elements &elements, const Planes &cells, const Configuration
 template <class T> T dampedRest(const Step &step, const T &start, std::size_t index) {
   T rest = start;
   if (step.rule)
-    for (const StageRule::PastStrains &past : step.rule->damping_past) rest += T(past.weight) * (start - read<T>(past.strains + index));
+    for (const StageRule::PastStrains &past : step.rule->damping_past)
+      rest += T(past.weight) * (start - read<T>(past.strains + index));
   return rest;
 }
 
-/// Axial force of every edge as a linear law of its strain over one step: stiffness (strain - rest), dissipation included. Over slots.
+/// Axial force of every edge as a linear law of its strain over one step: stiffness (strain - rest), dissipation
+/// included. Over slots.
 class AxialLaw {
 public:
   AxialLaw(const Scene &scene, const Elements &elements);
@@ -86,16 +95,19 @@ private:
 };
 
 /// The terms that the scene needs, in a fixed order; stretch is the first.
-std::vector<std::unique_ptr<Term>> makeTerms(const Scene &scene, const Elements &elements, const AxialLaw &axial, bool dynamic);
+std::vector<std::unique_ptr<Term>> makeTerms(const Scene &scene, const Elements &elements, const AxialLaw &axial,
+                                             bool dynamic);
 
 std::unique_ptr<Term> makeBendTwist(const Scene &, const Elements &);
 std::unique_ptr<Term> makeStretch(const Elements &, const AxialLaw &);
 std::unique_ptr<Term> makeInertia(const Scene &, const Elements &);
 std::unique_ptr<Term> makeLoad(const Scene &, const Elements &);
 
-/// What an end couple stores in the half edge beyond the last cell, by bending about the first and second director and by twist [J]. That half
-/// turns by moment x compliance, so the couple does twice this work at the end of the rod; the balance of forces is the same with or without it.
-std::array<double, 3> endEnergy(const Elements &elements, const Configuration &configuration, const EndCouple &end, double load_factor);
+/// What an end couple stores in the half edge beyond the last cell, by bending about the first and second director and
+/// by twist [J]. That half turns by moment x compliance, so the couple does twice this work at the end of the rod; the
+/// balance of forces is the same with or without it.
+std::array<double, 3> endEnergy(const Elements &elements, const Configuration &configuration, const EndCouple &end,
+                                double load_factor);
 
 /// Stored and kinetic energies of a state [J]; centrifugal potential counts as gravity.
 struct EnergyBudget {
@@ -104,9 +116,11 @@ struct EnergyBudget {
   EnergyBudget &operator+=(const EnergyBudget &other);
 };
 /// Of one rod. \param configuration that of the state
-EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, const Configuration &configuration, double load_factor, int rod);
+EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state,
+                          const Configuration &configuration, double load_factor, int rod);
 /// Of all rods.
-EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, const Configuration &configuration, double load_factor);
+EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state,
+                          const Configuration &configuration, double load_factor);
 /// The same, where the configuration is not at hand.
 EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, double load_factor);
 

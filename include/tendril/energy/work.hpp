@@ -1,6 +1,7 @@
 #pragma once
 /// \file work.hpp
-/// Work that loads and supports do in a step: what energies lose beyond it is dissipation. docs/theory.md tells the quadratures.
+/// Work that loads and supports do in a step: what energies lose beyond it is dissipation. docs/theory.md tells the
+/// quadratures.
 
 #include "tendril/energy/term.hpp"
 
@@ -17,24 +18,26 @@ struct Work {
   }
 };
 
-/// Work of a couple fixed in space and a torque about the tangent along the shortest way between two tangents, with a spin on the way [J]. Exact where the
-/// edge turns about one axis; else off by the third power of the turning.
+/// Work of a couple fixed in space and a torque about the tangent along the shortest way between two tangents, with a
+/// spin on the way [J]. Exact where the edge turns about one axis; else off by the third power of the turning.
 double coupleWork(const Vec3 &moment, double torque, const Vec3 &from, const Vec3 &to, double spin);
 
-/// Work of forces and couples between two configurations of one step, the load factor going from one value to another at a steady rate. A weight that grows
-/// adds to the potential that energies have of it: that counts here [J].
-double workOfLoads(const Scene &scene, const Elements &elements, const Configuration &start, const Configuration &end, double factor_start, double factor_end);
+/// Work of forces and couples between two configurations of one step, the load factor going from one value to another
+/// at a steady rate. A weight that grows adds to the potential that energies have of it: that counts here [J].
+double workOfLoads(const Scene &scene, const Elements &elements, const Configuration &start, const Configuration &end,
+                   double factor_start, double factor_end);
 
-/// What supports that move do to their rods, in the order of movingSupports: force [N], then moment about the vertex [N m] of each. The inertia of the held
-/// vertex itself is not in it: what it takes is the change of its kinetic energy.
+/// What supports that move do to their rods, in the order of movingSupports: force [N], then moment about the vertex [N
+/// m] of each. The inertia of the held vertex itself is not in it: what it takes is the change of its kinetic energy.
 using SupportActions = std::vector<Vec3>;
 std::vector<int> movingSupports(const Scene &scene);
 /// Work of these actions, constant between two times, by the displacements of vertices and the turning of frames [J].
-double workOfSupports(const Scene &scene, const Elements &elements, const Configuration &start, const Configuration &end, double from, double to,
-                      const SupportActions &actions);
+double workOfSupports(const Scene &scene, const Elements &elements, const Configuration &start,
+                      const Configuration &end, double from, double to, const SupportActions &actions);
 
 /// Both between two equilibria at the load factors that are their times, by the trapezoidal rule.
-Work staticWork(const Scene &scene, const Elements &elements, const State &before, const State &after, const Configuration &start, const Configuration &end);
+Work staticWork(const Scene &scene, const Elements &elements, const State &before, const State &after,
+                const Configuration &start, const Configuration &end);
 /// The same, where no configurations are at hand and no couple has turned its edge by more than half a turn.
 Work staticWork(const Scene &scene, const Elements &elements, const State &before, const State &after);
 

@@ -10,8 +10,8 @@ namespace tendril {
 
 using AlignedVector = std::vector<double, Eigen::aligned_allocator<double>>;
 
-/// Several arrays over the same slots. Loops run over whole packs: a pack may begin one slot before the first and end a pack beyond the last.
-/// Work arrays hold a window of the slots, which moves along the scene and stays in the cache.
+/// Several arrays over the same slots. Loops run over whole packs: a pack may begin one slot before the first and end a
+/// pack beyond the last. Work arrays hold a window of the slots, which moves along the scene and stays in the cache.
 class Planes {
 public:
   Planes() = default;
@@ -19,11 +19,15 @@ public:
   Planes(int planes, int slots) : stride_(planeStride(slots)), data_(std::size_t(planes) * stride_ + 2 * lanes, 0.0) {}
 
   double *operator[](int plane) { return data_.data() + (lanes + std::ptrdiff_t(plane) * stride_ - origin_); }
-  const double *operator[](int plane) const { return data_.data() + (lanes + std::ptrdiff_t(plane) * stride_ - origin_); }
+  const double *operator[](int plane) const {
+    return data_.data() + (lanes + std::ptrdiff_t(plane) * stride_ - origin_);
+  }
   /// Moves the window; it keeps what numbers it has.
   void setOrigin(int first_slot) { origin_ = first_slot; }
   int origin() const { return origin_; }
-  Vec3 vector(int plane, int slot) const { return {(*this)[plane][slot], (*this)[plane + 1][slot], (*this)[plane + 2][slot]}; }
+  Vec3 vector(int plane, int slot) const {
+    return {(*this)[plane][slot], (*this)[plane + 1][slot], (*this)[plane + 2][slot]};
+  }
   void setVector(int plane, int slot, const Vec3 &v) {
     for (int a = 0; a < 3; ++a) (*this)[plane + a][slot] = v[a];
   }

@@ -1,7 +1,8 @@
 #pragma once
 /// \file scalar.hpp
-/// The scalar types the physics kernels are written for: `double`, a SIMD `Pack` of doubles (one element per lane), and, in the tests, an
-/// automatic-differentiation type. Kernels use only arithmetic and the functions below, found for every type by argument-dependent lookup.
+/// The scalar types the physics kernels are written for: `double`, a SIMD `Pack` of doubles (one element per lane),
+/// and, in the tests, an automatic-differentiation type. Kernels use only arithmetic and the functions below, found for
+/// every type by argument-dependent lookup.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -47,7 +48,8 @@ inline void write(double *p, double v) { *p = v; }
 inline void write(double *p, const Pack &v) { v.copy_to(p, std::experimental::element_aligned); }
 template <class T> void addTo(double *p, const T &v) { write(p, read<T>(p) + v); }
 
-/// Adds `d` to the unevaluated sum high + low, of which `high` stays the rounded value (TwoSum: Knuth, The Art of Computer Programming 2, 4.2.2).
+/// Adds `d` to the unevaluated sum high + low, of which `high` stays the rounded value (TwoSum: Knuth, The Art of
+/// Computer Programming 2, 4.2.2).
 template <class T> void addTwoWords(T &high, T &low, const T &d) {
   const T sum = high + d, added = sum - high;
   const T rest = low + ((high - (sum - added)) + (d - added));
@@ -56,12 +58,15 @@ template <class T> void addTwoWords(T &high, T &low, const T &d) {
 }
 
 /// Lanes below `count`.
-inline Pack::mask_type firstLanes(int count) { return Pack([](auto lane) { return double(lane); }) < Pack(double(count)); }
+inline Pack::mask_type firstLanes(int count) {
+  return Pack([](auto lane) { return double(lane); }) < Pack(double(count));
+}
 
 inline double sum(double v) { return v; }
 inline double sum(const Pack &v) { return reduce(v); }
 
-// Transcendental functions: the C library's, for packs its vector versions (libmvec, errors below 4 ulp) where there are some.
+// Transcendental functions: the C library's, for packs its vector versions (libmvec, errors below 4 ulp) where there
+// are some.
 template <class T> T arcTangent(const T &x) {
   using std::atan;
   return atan(x);
@@ -97,7 +102,9 @@ Register TENDRIL_MVEC(v, sin)(Register);
 Register TENDRIL_MVEC(v, cos)(Register);
 }
 inline Pack arcTangent(const Pack &x) { return Pack(TENDRIL_MVEC(v, atan)(static_cast<Register>(x))); }
-inline Pack arcTangent2(const Pack &y, const Pack &x) { return Pack(TENDRIL_MVEC(vv, atan2)(static_cast<Register>(y), static_cast<Register>(x))); }
+inline Pack arcTangent2(const Pack &y, const Pack &x) {
+  return Pack(TENDRIL_MVEC(vv, atan2)(static_cast<Register>(y), static_cast<Register>(x)));
+}
 inline Pack sine(const Pack &x) { return Pack(TENDRIL_MVEC(v, sin)(static_cast<Register>(x))); }
 inline Pack cosine(const Pack &x) { return Pack(TENDRIL_MVEC(v, cos)(static_cast<Register>(x))); }
 #undef TENDRIL_MVEC

@@ -8,10 +8,10 @@
 
 namespace tendril {
 
-/// Slopes at points of the cubic spline through them over the length along their polyline [1]: its second derivative is continuous, and so is the third
-/// behind the first edge and before the last (`not a knot`: de Boor, *A Practical Guide to Splines*, 1978, chapter IV). It is off a smooth curve by the
-/// fourth power of the edge length. Three points have a parabola, two a straight line.
-/// \param points two or more, no two neighbours at one place
+/// Slopes at points of the cubic spline through them over the length along their polyline [1]: its second derivative is
+/// continuous, and so is the third behind the first edge and before the last (`not a knot`: de Boor, *A Practical Guide
+/// to Splines*, 1978, chapter IV). It is off a smooth curve by the fourth power of the edge length. Three points have a
+/// parabola, two a straight line. \param points two or more, no two neighbours at one place
 std::vector<Vec3> splineSlopes(const std::vector<Vec3> &points);
 
 /// The cubic between two points `length` apart with slopes m0 and m1, at a part t of the way.

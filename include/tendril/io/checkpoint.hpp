@@ -16,9 +16,10 @@ struct RunFacts {
   };
   bool dynamic = true;
   std::string integrator;
-  double dt = 0;                         ///< as asked for [s, or load factor]
-  std::vector<Fact> facts;               ///< options, loads, supports, materials, laws and shapes
-  std::string topology_hash, scene_hash; ///< of vertices, edges and closedness of all rods; of the text of the scene and its files
+  double dt = 0;           ///< as asked for [s, or load factor]
+  std::vector<Fact> facts; ///< options, loads, supports, materials, laws and shapes
+  std::string topology_hash,
+      scene_hash; ///< of vertices, edges and closedness of all rods; of the text of the scene and its files
 
   /// \param text of the scene and the files it names
   RunFacts(const Scene &scene, const LoopSettings &settings, const std::string &text = "");
@@ -32,12 +33,13 @@ struct DamagedCheckpoint : SceneError {
 /// Writes beside `path` and renames: the file is always whole. \throws WriteError when it cannot be written
 void writeCheckpoint(const std::string &path, const Simulation &run, const StepControl &control, const RunFacts &facts);
 
-/// Takes up a checkpoint as the state of a run. Where nothing but options and loads is other, to the bit, with what the integrator remembers if it is the
-/// same; else the integrator begins anew. Between statics and dynamics the positions are taken, at rest and at time 0.
-/// \param run made ready for the scene; its sizes are what the file must fit
-/// \param told lines for the user: what has changed, and what follows from it
-/// \return whether anything but options is other
-/// \throws DamagedCheckpoint when the file is missing, or not as it was written; SceneError when it is of another topology. Nothing has changed then
-bool readCheckpoint(const std::string &path, Simulation *run, StepControl *control, const RunFacts &facts, std::vector<std::string> *told);
+/// Takes up a checkpoint as the state of a run. Where nothing but options and loads is other, to the bit, with what the
+/// integrator remembers if it is the same; else the integrator begins anew. Between statics and dynamics the positions
+/// are taken, at rest and at time 0. \param run made ready for the scene; its sizes are what the file must fit \param
+/// told lines for the user: what has changed, and what follows from it \return whether anything but options is other
+/// \throws DamagedCheckpoint when the file is missing, or not as it was written; SceneError when it is of another
+/// topology. Nothing has changed then
+bool readCheckpoint(const std::string &path, Simulation *run, StepControl *control, const RunFacts &facts,
+                    std::vector<std::string> *told);
 
 } // namespace tendril

@@ -47,7 +47,8 @@ class Hdf5File {
 public:
   /// For reading. \throws SceneError
   static Hdf5File open(const std::string &path);
-  /// A new file whose datasets only grow; every flush leaves it readable (HDF5's single writer, multiple readers). \throws SceneError
+  /// A new file whose datasets only grow; every flush leaves it readable (HDF5's single writer, multiple readers).
+  /// \throws SceneError
   static Hdf5File create(const std::string &path);
   /// A file that is complete, to add to it. \throws SceneError
   static Hdf5File reopen(const std::string &path);
@@ -68,7 +69,8 @@ public:
 
   void createGroup(const std::string &name);
   /// \param unit becomes the attribute `unit`, if not empty
-  void write(const std::string &name, const std::vector<hsize_t> &shape, const double *values, const std::string &unit = "");
+  void write(const std::string &name, const std::vector<hsize_t> &shape, const double *values,
+             const std::string &unit = "");
   void write(const std::string &name, const std::vector<hsize_t> &shape, const int *values);
   /// A list of strings, UTF-8, padded with zeros to the longest.
   void write(const std::string &name, const std::vector<std::string> &values);
@@ -92,8 +94,8 @@ private:
   Hdf5Object objectAt(const std::string &name) const;
 };
 
-/// A dataset that grows by one slab per append: shape (n, slab...). Small slabs wait in memory until flush() and are then written at once; large
-/// ones go to the file directly. Readers see both after flush().
+/// A dataset that grows by one slab per append: shape (n, slab...). Small slabs wait in memory until flush() and are
+/// then written at once; large ones go to the file directly. Readers see both after flush().
 class Hdf5Series {
 public:
   Hdf5Series(const Hdf5File &file, const std::string &name, const std::vector<hsize_t> &slab, bool integer = false);

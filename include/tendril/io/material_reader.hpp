@@ -16,7 +16,8 @@ std::vector<const Key *> rodOverrides();
 
 struct MaterialRead {
   Material material;
-  std::string defaults; ///< a line that tells the parameters that nobody gave, with their values; empty where there are none
+  std::string
+      defaults; ///< a line that tells the parameters that nobody gave, with their values; empty where there are none
 };
 
 /// \param rod its block, which must have a material, or the word `default`, unless options give one

@@ -18,7 +18,8 @@ public:
   const std::vector<std::string> &files() const { return files_; }
   /// "file:line" of an option, without its dash; empty where the command line gives it, or nothing does.
   std::string place(const std::string &option) const;
-  /// The message with the place of the option that it begins with. PETSc's name no option: they get those whose value they tell, or the files.
+  /// The message with the place of the option that it begins with. PETSc's name no option: they get those whose value
+  /// they tell, or the files.
   std::string locate(const std::string &message) const;
 
 private:

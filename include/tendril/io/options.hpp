@@ -49,6 +49,7 @@ std::vector<int> edgesAsked(const Scene &scene, const Options &options);
 PetscErrorCode refuseUnknownOptions();
 
 /// Writes all that is in force, PETSc's options included, as YAML, and returns what it wrote.
-std::string writeOptionsFile(const std::string &path, const Options &options, const Provenance &provenance, const Scene &scene);
+std::string writeOptionsFile(const std::string &path, const Options &options, const Provenance &provenance,
+                             const Scene &scene);
 
 } // namespace tendril

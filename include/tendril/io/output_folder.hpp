@@ -22,8 +22,8 @@ public:
   bool replaces(const std::string &file) const;
   /// Removes results of earlier runs, with all parts; names of what went.
   std::vector<std::string> clear() const;
-  /// Makes room for a run that goes on from one of checkpoints(): moves the results that it is of to part_1, part_2 ..., or removes results of
-  /// a run that had none. Path of that checkpoint then.
+  /// Makes room for a run that goes on from one of checkpoints(): moves the results that it is of to part_1, part_2
+  /// ..., or removes results of a run that had none. Path of that checkpoint then.
   std::string setAside(const std::string &checkpoint) const;
 
 private:

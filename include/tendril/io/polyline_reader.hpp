@@ -9,9 +9,10 @@
 namespace tendril {
 
 /// Reads all polylines of a file, by its extension:
-///   .csv .txt  one point per line, three numbers separated by commas or blanks; `#` begins a comment, an empty line ends a polyline;
-///   .obj       `v` vertices and `l` elements; those that share vertices are one polyline, closed where it ends where it began;
-///   .h5 .hdf5  dataset `position` (n,3), and optionally `rod_vertex_offsets` (nr+1) and `closed` (nr).
+///   .csv .txt  one point per line, three numbers separated by commas or blanks; `#` begins a comment, an empty line
+///   ends a polyline; .obj       `v` vertices and `l` elements; those that share vertices are one polyline, closed
+///   where it ends where it began; .h5 .hdf5  dataset `position` (n,3), and optionally `rod_vertex_offsets` (nr+1) and
+///   `closed` (nr).
 /// \throws SceneError with file and line
 std::vector<Polyline> readPolylines(const std::string &path);
 

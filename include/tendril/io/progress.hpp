@@ -1,7 +1,7 @@
 #pragma once
 /// \file progress.hpp
-/// What a user sees while a run goes on: one line that is rewritten on a terminal, now and then a line in a log; and where nothing happens for some seconds,
-/// what takes so long.
+/// What a user sees while a run goes on: one line that is rewritten on a terminal, now and then a line in a log; and
+/// where nothing happens for some seconds, what takes so long.
 
 #include "tendril/dynamics/time_loop.hpp"
 

@@ -18,8 +18,9 @@ struct RunSettings {
 /// What a scene was read from.
 struct SceneSource {
   std::string text;
-  std::vector<std::pair<std::string, std::string>> files; ///< path as written and content of each text file that it names
-  std::vector<std::string> paths;                         ///< of all files it was read from
+  std::vector<std::pair<std::string, std::string>>
+      files;                      ///< path as written and content of each text file that it names
+  std::vector<std::string> paths; ///< of all files it was read from
 };
 
 struct SceneFile {
@@ -30,7 +31,8 @@ struct SceneFile {
   std::vector<std::string> notes; ///< to be told at the start: defaults of materials, and warnings
 };
 
-/// Rods that a word means: a name, which is also that of all rods of its block, a number from 0, or `all`. Empty where it means none.
+/// Rods that a word means: a name, which is also that of all rods of its block, a number from 0, or `all`. Empty where
+/// it means none.
 std::vector<int> rodsOf(const std::vector<Rod> &rods, const std::string &word);
 
 /// \throws SceneError

@@ -10,7 +10,8 @@
 
 namespace tendril {
 
-/// Keeps what the signals that end programs did before, for libraries put handlers of their own in their place; restored by the call.
+/// Keeps what the signals that end programs did before, for libraries put handlers of their own in their place;
+/// restored by the call.
 class KeptSignals {
 public:
   KeptSignals();
@@ -20,7 +21,8 @@ private:
   std::vector<std::pair<int, struct sigaction>> before_;
 };
 
-/// While it lives, the first SIGINT or SIGTERM only asks the run to stop; the second ends it. Signals that were ignored stay so.
+/// While it lives, the first SIGINT or SIGTERM only asks the run to stop; the second ends it. Signals that were ignored
+/// stay so.
 class StopRequest {
 public:
   using Clock = std::chrono::steady_clock;

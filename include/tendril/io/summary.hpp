@@ -16,21 +16,23 @@ struct Summary {
       if (other > value) *this = {other, r, i};
     }
   };
-  double time = 0;                                              ///< in statics the load factor
-  double mass = 0;                                              ///< [kg]
-  Vec3 centre_of_mass = Vec3::Zero();                           ///< [m]
-  Extreme displacement;                                         ///< from the place as drawn [m]
-  Extreme tension, compression;                                 ///< internal force along the tangent [N]
-  Extreme angle;                                                ///< turning or twist between the edges at a vertex, cables left out [rad]
-  std::vector<Vec3> force, moment;                              ///< (ns) what each support does to its rod, see RodActions [N], [N m]
-  Vec3 total_force = Vec3::Zero(), total_moment = Vec3::Zero(); ///< of all supports, the moment about the origin [N], [N m]
+  double time = 0;                    ///< in statics the load factor
+  double mass = 0;                    ///< [kg]
+  Vec3 centre_of_mass = Vec3::Zero(); ///< [m]
+  Extreme displacement;               ///< from the place as drawn [m]
+  Extreme tension, compression;       ///< internal force along the tangent [N]
+  Extreme angle;                      ///< turning or twist between the edges at a vertex, cables left out [rad]
+  std::vector<Vec3> force, moment;    ///< (ns) what each support does to its rod, see RodActions [N], [N m]
+  Vec3 total_force = Vec3::Zero(),
+       total_moment = Vec3::Zero(); ///< of all supports, the moment about the origin [N], [N m]
 };
 
 /// \param load_factor on the loads of the scene
 Summary summarize(const Scene &scene, const Elements &elements, const State &state, double load_factor);
 /// A few lines; supports one by one where they are few.
 std::vector<std::string> describe(const Summary &summary, const Scene &scene);
-/// Attributes of /summary, which has to be there. Before the end of a run they are those of no state, nan and -1: a file that grows takes no new ones.
+/// Attributes of /summary, which has to be there. Before the end of a run they are those of no state, nan and -1: a
+/// file that grows takes no new ones.
 void writeSummary(Hdf5File &file, const Summary &summary);
 Summary emptySummary(const Scene &scene);
 /// Supports that are told one by one, where there are no more than that.

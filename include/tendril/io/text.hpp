@@ -11,7 +11,8 @@ namespace tendril {
 /// \throws SceneError: cannot be opened, is larger than 64 MB, or with the line of the first byte that is no text
 std::string readText(const std::string &path, const std::string &missing);
 
-/// The bytes of a file, a pipe or a device, without a byte order mark of UTF-8. \throws SceneError: cannot be opened, or has more than `most`
+/// The bytes of a file, a pipe or a device, without a byte order mark of UTF-8. \throws SceneError: cannot be opened,
+/// or has more than `most`
 std::string readBytes(const std::string &path, const std::string &missing, std::size_t most);
 
 /// What may go to a terminal: control characters but newline and tab, and bytes that are no UTF-8, as \xNN.

@@ -1,6 +1,7 @@
 #pragma once
 /// \file trajectory.hpp
-/// Trajectories: one HDF5 file that grows frame by frame (layout in docs/reading_results.md) and the XDMF file by which ParaView reads it.
+/// Trajectories: one HDF5 file that grows frame by frame (layout in docs/reading_results.md) and the XDMF file by which
+/// ParaView reads it.
 
 #include "tendril/dynamics/diagnostics.hpp"
 #include "tendril/io/hdf5.hpp"
@@ -23,14 +24,14 @@ struct Provenance {
   int ranks = 1;
 };
 
-/// What is written waits in memory, or in HDF5, until it is flushed: flushWhenDue() after every step does so half a second after the last time, or
-/// when 4 MB wait. A killed run loses what was not flushed and nothing else.
+/// What is written waits in memory, or in HDF5, until it is flushed: flushWhenDue() after every step does so half a
+/// second after the last time, or when 4 MB wait. A killed run loses what was not flushed and nothing else.
 class TrajectoryWriter {
 public:
   /// \param fields which of fieldNames() and derivedFieldNames() to write; position always
   /// \param dynamic statics: the time of a state is also the load factor
-  TrajectoryWriter(const std::string &folder, const Scene &scene, const Elements &elements, const Provenance &provenance, const std::set<std::string> &fields,
-                   bool dynamic);
+  TrajectoryWriter(const std::string &folder, const Scene &scene, const Elements &elements,
+                   const Provenance &provenance, const std::set<std::string> &fields, bool dynamic);
   ~TrajectoryWriter();
   void writeFrame(const State &state);
   /// Also to diagnostics.csv.
@@ -68,7 +69,7 @@ private:
   std::vector<std::unique_ptr<Hdf5Series>> state_; ///< of all fields in their order; null where one is not written
   std::unique_ptr<Hdf5Series> time_, step_, critical_;
   std::vector<std::unique_ptr<Hdf5Series>> diagnostics_;
-  bool broken_ = false, finished_ = false;   ///< a flush failed, after which HDF5 must not touch the file; all is written
+  bool broken_ = false, finished_ = false; ///< a flush failed, after which HDF5 must not touch the file; all is written
   Clock::time_point flushed_, described_at_; ///< long ago: the first frame goes to the files at once
   std::size_t described_ = 0;                ///< frames in the XDMF file
 

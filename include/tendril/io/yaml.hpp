@@ -10,14 +10,16 @@
 
 namespace tendril {
 
-/// The documents of a YAML text. Refused are more than a few million values (those of aliases counted where they stand), maps and lists in more than 32
-/// others, and what no document can begin with, at which yaml-cpp would stay for ever. \throws SceneError with the line
+/// The documents of a YAML text. Refused are more than a few million values (those of aliases counted where they
+/// stand), maps and lists in more than 32 others, and what no document can begin with, at which yaml-cpp would stay for
+/// ever. \throws SceneError with the line
 std::vector<YAML::Node> loadYaml(const std::string &text, const std::string &file);
 
 /// One value of a YAML file.
 class YamlValue {
 public:
-  YamlValue(const YAML::Node &node, std::string file, std::string name) : node_(node), file_(std::move(file)), name_(std::move(name)) {}
+  YamlValue(const YAML::Node &node, std::string file, std::string name)
+      : node_(node), file_(std::move(file)), name_(std::move(name)) {}
 
   /// File and line, or the option.
   std::string place() const;
@@ -47,8 +49,9 @@ private:
   std::string file_, name_;
 };
 
-/// A YAML map, read by the table of keys: types, bounds, choices and fallbacks are those of the table, and every message names the line. A key given
-/// twice is an error, and so are keys that are not in the table or were never asked for, found by finish().
+/// A YAML map, read by the table of keys: types, bounds, choices and fallbacks are those of the table, and every
+/// message names the line. A key given twice is an error, and so are keys that are not in the table or were never asked
+/// for, found by finish().
 class YamlMap {
 public:
   /// The whole file.

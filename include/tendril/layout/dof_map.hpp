@@ -2,10 +2,13 @@
 /// \file dof_map.hpp
 /// Where the unknowns are. Three numberings:
 ///   vertices and edges   of the whole scene, rod after rod, in scene order, as files have them;
-///   slots                of the arrays the element loops stream through: vertex i, edge i and the cell at vertex i of a rod share its slot
-///                        first_slot + i. Behind a ring come copies of its first two vertices and first edge; around an open rod there is room for
-///                        the frames that clamps hold. Element loops know neither ends nor rings;
-///   unknowns             of PETSc's global vector: x, y, z and twist of each slot that neither is a copy nor is held by a support.
+///   slots                of the arrays the element loops stream through: vertex i, edge i and the cell at vertex i of
+///   a rod share its slot
+///                        first_slot + i. Behind a ring come copies of its first two vertices and first edge; around an
+///                        open rod there is room for the frames that clamps hold. Element loops know neither ends nor
+///                        rings;
+///   unknowns             of PETSc's global vector: x, y, z and twist of each slot that neither is a copy nor is held
+///   by a support.
 
 #include "tendril/layout/edge_blocks.hpp"
 #include "tendril/layout/petsc.hpp"
@@ -45,7 +48,9 @@ public:
   PetscInt unknowns(RodSet rods) const { return unknown_begin_[rods.end] - unknown_begin_[rods.begin]; }
   RodSet all() const { return {0, int(rods_.size())}; }
   /// Slots from the first rod's first to the one behind the last rod's room.
-  int slots(RodSet rods) const { return rods_[rods.end - 1].first_slot + rods_[rods.end - 1].slots - rods_[rods.begin].first_slot; }
+  int slots(RodSet rods) const {
+    return rods_[rods.end - 1].first_slot + rods_[rods.end - 1].slots - rods_[rods.begin].first_slot;
+  }
 
   /// out = values of the unknowns of some rods; of these, rods not `wanted` (by scene order) get zero.
   PetscErrorCode gather(const Planes &values, RodSet rods, Vec out, const std::vector<char> *wanted = nullptr) const;
@@ -58,7 +63,8 @@ private:
   PetscInt unknowns_ = 0;
   std::vector<bool> held_;
   std::vector<PetscInt> unknown_, unknown_begin_;
-  /// Entries of the matrix in its own order: where their values are in the blocks, those to be taken off as their complement.
+  /// Entries of the matrix in its own order: where their values are in the blocks, those to be taken off as their
+  /// complement.
   std::vector<std::ptrdiff_t> source_;
   std::vector<double> entries_;
   OwnedDM dm_;

@@ -1,8 +1,9 @@
 #pragma once
 /// \file edge_blocks.hpp
-/// Symmetric matrices of all rods, such as the Hessian of the incremental potential, in edge variables: edge vectors e_i = x_{i+1} - x_i, edge
-/// twists, and vertex positions. In vertex coordinates the same matrix has entries of the order EI/h^3 that cancel, and a solve loses digits with
-/// the fourth power of length over edge length; here nothing cancels (docs/theory.md, Rounding).
+/// Symmetric matrices of all rods, such as the Hessian of the incremental potential, in edge variables: edge vectors
+/// e_i = x_{i+1} - x_i, edge twists, and vertex positions. In vertex coordinates the same matrix has entries of the
+/// order EI/h^3 that cancel, and a solve loses digits with the fourth power of length over edge length; here nothing
+/// cancels (docs/theory.md, Rounding).
 
 #include "tendril/layout/rod_range.hpp"
 
@@ -13,14 +14,18 @@ inline constexpr int edge_size = 4, edge_pairs = edge_size * (edge_size + 1) / 2
 /// Numbers of a slot: edge i with itself (10), edge i - 1 with edge i (16), the position of vertex i with itself (6).
 inline constexpr int slot_entries = edge_pairs + edge_size * edge_size + 6;
 
-/// The 32 entries of a slot are planes over the slots of a rod. Behind a ring, the copy of its first slot holds what the last edge has with the
-/// first; the other copies are added to what they stand for (fold).
+/// The 32 entries of a slot are planes over the slots of a rod. Behind a ring, the copy of its first slot holds what
+/// the last edge has with the first; the other copies are added to what they stand for (fold).
 class EdgeBlocks {
 public:
   /// Planes of a slot's entries. Edge variables r, c in 0..3: e_x, e_y, e_z, twist.
   static constexpr int own(int r, int c) { return r * edge_size - r * (r - 1) / 2 + (c - r); } ///< r <= c
-  static constexpr int across(int r, int c) { return edge_pairs + edge_size * r + c; }         ///< r of the edge before, c of the edge
-  static constexpr int vertex(int r, int c) { return edge_pairs + edge_size * edge_size + r * 3 - r * (r - 1) / 2 + (c - r); } ///< r <= c < 3
+  static constexpr int across(int r, int c) {
+    return edge_pairs + edge_size * r + c;
+  } ///< r of the edge before, c of the edge
+  static constexpr int vertex(int r, int c) {
+    return edge_pairs + edge_size * edge_size + r * 3 - r * (r - 1) / 2 + (c - r);
+  } ///< r <= c < 3
 
   EdgeBlocks() = default;
   /// Of all rods, or of as many neighbours as so many slots hold.
@@ -35,10 +40,12 @@ public:
   void subtractFrom(const EdgeBlocks &other);
   /// Adds what was summed into the copies behind a ring to the slots they stand for.
   void fold(const RodRange &rod);
-  /// y += A x for one rod in vertex coordinates (x, y, z, twist of each slot), copies behind a ring included in x and in y.
+  /// y += A x for one rod in vertex coordinates (x, y, z, twist of each slot), copies behind a ring included in x and
+  /// in y.
   void multiply(const RodRange &rod, const Planes &x, Planes &y) const;
 
-  /// Root of the sum of (x_i A_ij x_j)^2 over the entries of one rod: rounding of the entries, each its own, changes x'A x by an epsilon of it.
+  /// Root of the sum of (x_i A_ij x_j)^2 over the entries of one rod: rounding of the entries, each its own, changes
+  /// x'A x by an epsilon of it.
   double magnitude(const RodRange &rod, const Planes &x) const;
 
   /// Where the plane of an entry begins in data().

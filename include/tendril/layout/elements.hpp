@@ -1,21 +1,22 @@
 #pragma once
 /// \file elements.hpp
-/// The scene cut into elements: edges (stretch, twist inertia), vertices (mass) and cells (bending and twist), as arrays over slots (see DofMap)
-/// that the element loops stream through. Built once; constant afterwards.
+/// The scene cut into elements: edges (stretch, twist inertia), vertices (mass) and cells (bending and twist), as
+/// arrays over slots (see DofMap) that the element loops stream through. Built once; constant afterwards.
 
 #include "tendril/layout/dof_map.hpp"
 
 namespace tendril {
 
-/// A cell that is not the one between the two edges at its slot: half cells of supports along a rod. Its constants have a slot of their own.
+/// A cell that is not the one between the two edges at its slot: half cells of supports along a rod. Its constants have
+/// a slot of their own.
 struct LooseCell {
   int slot;
   int frame0, frame1; ///< slots of the frames it joins
   int vertex;         ///< slot of the vertex in the middle of its unknowns
 };
 
-/// Half of the end edge of an end that is free to turn, beyond all cells, where couples on that edge act at the end: their moment is the whole
-/// moment of the rod there.
+/// Half of the end edge of an end that is free to turn, beyond all cells, where couples on that edge act at the end:
+/// their moment is the whole moment of the rod there.
 struct EndCouple {
   bool last;                        ///< at the last vertex of its rod, or the first
   int edge, cell;                   ///< slots of the edge and of the cell at its other end, -1 without one
@@ -33,9 +34,9 @@ public:
 
   /// Regular cells of a rod, [begin, end): the cell at slot s joins the frames at s - 1 and s.
   std::vector<int> cell_begin, cell_end;
-  std::vector<std::vector<LooseCell>> loose; ///< per rod
+  std::vector<std::vector<LooseCell>> loose;       ///< per rod
   std::vector<std::vector<EndCouple>> end_couples; ///< per rod
-  std::vector<int> support_slot;             ///< of each support's frame, or -1 where nothing meets it
+  std::vector<int> support_slot;                   ///< of each support's frame, or -1 where nothing meets it
 
   // In scene order.
   std::vector<int> vertex0, vertex1; ///< ends of each edge
@@ -43,13 +44,13 @@ public:
   std::vector<int> rod_cells; ///< offsets of the rods' cells (nr + 1)
 
   // Over slots; zero where there is no such element, except rest lengths, which are one there.
-  const double *mass() const { return constants_[0]; }                ///< of vertices [kg]
-  const double *restLength() const { return constants_[1]; }          ///< of edges [m]
-  const double *inverseRestLength() const { return constants_[2]; }   ///< [1/m]
-  const double *axialStiffness() const { return constants_[3]; }      ///< [N]
-  const double *twistMass() const { return constants_[4]; }           ///< r_L L of edges [kg m^2]
-  const double *freedom() const { return constants_[5]; }             ///< 1 for vertices that are not held
-  const double *cellLength() const { return constants_[6]; }          ///< Lbar [m]
+  const double *mass() const { return constants_[0]; }              ///< of vertices [kg]
+  const double *restLength() const { return constants_[1]; }        ///< of edges [m]
+  const double *inverseRestLength() const { return constants_[2]; } ///< [1/m]
+  const double *axialStiffness() const { return constants_[3]; }    ///< [N]
+  const double *twistMass() const { return constants_[4]; }         ///< r_L L of edges [kg m^2]
+  const double *freedom() const { return constants_[5]; }           ///< 1 for vertices that are not held
+  const double *cellLength() const { return constants_[6]; }        ///< Lbar [m]
   /// stiffness, 3 planes; rest, 3; weight, 2; free, 2; base, 1 (CellOf)
   const Planes &cells() const { return cells_; }
   int vertices() const { return int(vertex_slot.size()); }
@@ -70,6 +71,13 @@ std::vector<LooseCell> heldCells(const Elements &elements, int rod, int frame);
 int edgeAt(const RodRange &rod, int slot);
 
 /// Planes of Elements::cells().
-enum CellPlane : int { cell_stiffness = 0, cell_rest = 3, cell_weight = 6, cell_free = 8, cell_base = 10, cell_planes = 11 };
+enum CellPlane : int {
+  cell_stiffness = 0,
+  cell_rest = 3,
+  cell_weight = 6,
+  cell_free = 8,
+  cell_base = 10,
+  cell_planes = 11
+};
 
 } // namespace tendril

@@ -6,7 +6,8 @@
 
 namespace tendril {
 
-/// For each rod the first one of which it is a shifted copy: with the same shape, material, supports and loads. In a frame that turns, its own number.
+/// For each rod the first one of which it is a shifted copy: with the same shape, material, supports and loads. In a
+/// frame that turns, its own number.
 std::vector<int> firstAlike(const Scene &scene, const std::vector<Drawing> &drawings);
 
 /// The scene with some of its rods only, and what holds and pulls them. \param rods increasing

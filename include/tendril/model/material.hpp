@@ -7,8 +7,8 @@
 
 namespace tendril {
 
-/// Shape of a homogeneous section. `size` is (radius, -), (semi-axis along the first director, along the second), or (width along the
-/// first director, height along the second) [m].
+/// Shape of a homogeneous section. `size` is (radius, -), (semi-axis along the first director, along the second), or
+/// (width along the first director, height along the second) [m].
 enum class SectionShape { circle, ellipse, rectangle };
 struct Section {
   SectionShape shape;
@@ -27,14 +27,16 @@ struct Material {
   std::array<double, 2> flexural_stiffness{5e-4, 5e-4}; ///< about the first and the second director [N m^2]
   double mass_damping_coefficient = 0;                  ///< [1/s]
   double stiffness_damping_coefficient = 0;             ///< [s]
-  std::optional<Section> section = std::nullopt;        ///< none where only stiffness is given; for pictures, the mechanics do not use it
+  std::optional<Section> section =
+      std::nullopt; ///< none where only stiffness is given; for pictures, the mechanics do not use it
 
   /// A cable: bending and twist cost nothing and the rod carries no twist unknowns.
   bool isCable() const { return flexural_stiffness[0] == 0 && flexural_stiffness[1] == 0; }
   bool operator==(const Material &) const = default;
 };
 
-/// Geometric constants of a section: area [m^2], second moments about the first and second director, torsion constant [m^4].
+/// Geometric constants of a section: area [m^2], second moments about the first and second director, torsion constant
+/// [m^4].
 struct SectionConstants {
   double area;
   std::array<double, 2> second_moment;

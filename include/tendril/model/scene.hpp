@@ -1,6 +1,7 @@
 #pragma once
 /// \file scene.hpp
-/// The scene: all that is fixed once set-up is done. Rods, what holds them, what pulls on them. Nothing here changes during a run.
+/// The scene: all that is fixed once set-up is done. Rods, what holds them, what pulls on them. Nothing here changes
+/// during a run.
 
 #include "tendril/model/material.hpp"
 #include "tendril/model/strain.hpp"
@@ -18,7 +19,8 @@ struct SceneError : std::runtime_error {
 /// A number with three digits, for messages.
 std::string shortText(double value);
 
-/// Rod as drawn: the reference configuration. Vertex i and i+1 bound edge i; a closed rod has as many edges as vertices.
+/// Rod as drawn: the reference configuration. Vertex i and i+1 bound edge i; a closed rod has as many edges as
+/// vertices.
 struct Rod {
   std::string name;
   bool closed = false;
@@ -30,16 +32,18 @@ struct Rod {
   bool gravity = true;
   /// Natural curvature about the two directors and twist (each [1/m]) where the rod is not stress-free as drawn.
   enum class Natural { as_drawn, given } natural = Natural::as_drawn;
-  Vec3 natural_strain = Vec3::Zero();   ///< (curvature 1, curvature 2, twist) for Natural::given; zero is a straight rod
+  Vec3 natural_strain = Vec3::Zero(); ///< (curvature 1, curvature 2, twist) for Natural::given; zero is a straight rod
   Vec3 initial_velocity = Vec3::Zero(); ///< [m/s]
 
-  double initial_turns = 0; ///< turns of twist put in at the start, spread by arc length; the natural shape does not have them
+  double initial_turns =
+      0; ///< turns of twist put in at the start, spread by arc length; the natural shape does not have them
 
   int vertices() const { return int(position.size()); }
   int edges() const { return vertices() - (closed ? 0 : 1); }
   int next(int vertex) const { return vertex + 1 == vertices() ? 0 : vertex + 1; }
   Vec3 edge(int i) const { return position[next(i)] - position[i]; }
-  /// Edge on the far side of a vertex (towards lower numbers), or -1 at the first vertex of an open rod; and the other way.
+  /// Edge on the far side of a vertex (towards lower numbers), or -1 at the first vertex of an open rod; and the other
+  /// way.
   int edgeBefore(int vertex) const { return vertex > 0 ? vertex - 1 : closed ? edges() - 1 : -1; }
   int edgeAfter(int vertex) const { return vertex < edges() ? vertex : -1; }
 };
@@ -63,17 +67,19 @@ struct Motion {
   Vec3 velocityAt(double time) const;       ///< where it jumps, that before [m/s]
   Vec3 rotationVectorAt(double time) const; ///< [rad]
   Mat3 rotationAt(double time) const;
-  /// Sum of the rotation vectors of its parts between two times, each of less than half a radian: whole turns are counted [rad].
+  /// Sum of the rotation vectors of its parts between two times, each of less than half a radian: whole turns are
+  /// counted [rad].
   Vec3 turnBetween(double from, double to) const;
 };
 
-/// What holds a vertex. `clamp` holds its position, tangent and director by half cells to a fixed frame; `pin` its position;
-/// `fix_twist` the twist of the rod there, by half cells, relative to the frame (a joint of constant velocity: the tangent is free).
+/// What holds a vertex. `clamp` holds its position, tangent and director by half cells to a fixed frame; `pin` its
+/// position; `fix_twist` the twist of the rod there, by half cells, relative to the frame (a joint of constant
+/// velocity: the tangent is free).
 struct Support {
   enum class Kind { clamp, pin, fix_twist } kind;
   int rod, vertex;
   Motion motion;
-  Frame frame; ///< reference frame at the vertex (clamp, fix_twist); length 1
+  Frame frame;                                        ///< reference frame at the vertex (clamp, fix_twist); length 1
   bool tangent_given = false, director_given = false; ///< by the scene; otherwise the frame is that of the rod as drawn
 
   bool holdsPosition() const { return kind != Kind::fix_twist; }
@@ -99,29 +105,35 @@ struct Scene {
   std::vector<NodalForce> forces;
   std::vector<EdgeMoment> moments;
   Vec3 gravity{0, -9.81, 0}; ///< [m/s^2]
-  /// Statics in a frame that turns about an axis through `centre`: the scene is at rest there, under centrifugal forces.
+  /// Statics in a frame that turns about an axis through `centre`: the scene is at rest there, under centrifugal
+  /// forces.
   struct Rotation {
     Vec3 angular_velocity = Vec3::Zero(); ///< [rad/s]
     Vec3 centre = Vec3::Zero();           ///< [m]
     /// Acceleration at a place: matrix() (x - centre).
-    Mat3 matrix() const { return angular_velocity.squaredNorm() * Mat3::Identity() - angular_velocity * angular_velocity.transpose(); }
+    Mat3 matrix() const {
+      return angular_velocity.squaredNorm() * Mat3::Identity() - angular_velocity * angular_velocity.transpose();
+    }
   } rotation;
 
   /// Whether the stiffness of any rod dissipates.
   bool stiffnessDissipates() const;
 };
 
-/// Fills the directors of a rod with discrete Bishop frames: `start` (or some normal of the first edge when zero) transported along the
-/// polyline; on a closed rod the angle that remains after one round is spread over the edges by arc length.
+/// Fills the directors of a rod with discrete Bishop frames: `start` (or some normal of the first edge when zero)
+/// transported along the polyline; on a closed rod the angle that remains after one round is spread over the edges by
+/// arc length.
 void setBishopDirectors(Rod &rod, const Vec3 &start = Vec3::Zero());
 
 /// Reference frame of edge i.
 Frame referenceFrame(const Rod &rod, int edge);
 
-/// Frame of the rod at a vertex: the mean of its two edges' frames; at an end, the tangent of the curve extrapolated by half an edge.
+/// Frame of the rod at a vertex: the mean of its two edges' frames; at an end, the tangent of the curve extrapolated by
+/// half an edge.
 Frame frameAtVertex(const Rod &rod, int vertex);
 
-/// Checks what the reader cannot see at one line: zero-length and folded edges, directors, indices. \throws SceneError naming the rod.
+/// Checks what the reader cannot see at one line: zero-length and folded edges, directors, indices. \throws SceneError
+/// naming the rod.
 void checkRod(const Rod &rod);
 
 /// Sizes of one rod that tell what to expect of it.
@@ -131,8 +143,9 @@ struct DimensionlessGroups {
   double axial_to_bending; ///< EA L^2 / EI
   double largest_turning;  ///< per vertex [deg]
   double largest_twist;    ///< per vertex, of the reference directors [deg]
-  /// With `energy: seed`, what stretch adds to the bending compliance L/EI at the corner (above 30 degrees) where that is most: a moment M stretches the
-  /// two edges by M theta/(2 EA h), by which a natural turning theta opens: theta^2 EI/(2 EA h L). It grows without end as the edges h get shorter.
+  /// With `energy: seed`, what stretch adds to the bending compliance L/EI at the corner (above 30 degrees) where that
+  /// is most: a moment M stretches the two edges by M theta/(2 EA h), by which a natural turning theta opens: theta^2
+  /// EI/(2 EA h L). It grows without end as the edges h get shorter.
   double corner_softness;
   int softest_corner; ///< that vertex
 };

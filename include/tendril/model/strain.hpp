@@ -1,7 +1,8 @@
 #pragma once
 /// \file strain.hpp
-/// Strains of a rod: axial strain of an edge, bending and twist of a cell, which are the two edge frames that meet at a vertex, or an edge and the
-/// fixed frame of a clamp (the half cell). Discrete curvature binormal after Bergou et al., "Discrete Elastic Rods" (2008), section 4.2.
+/// Strains of a rod: axial strain of an edge, bending and twist of a cell, which are the two edge frames that meet at a
+/// vertex, or an edge and the fixed frame of a clamp (the half cell). Discrete curvature binormal after Bergou et al.,
+/// "Discrete Elastic Rods" (2008), section 4.2.
 
 #include "tendril/geometry/frame.hpp"
 
@@ -9,14 +10,16 @@
 
 namespace tendril {
 
-/// How an angle between neighbouring edges becomes a strain: `tan` is 2 tan(angle/2), a barrier at 180 degrees; `angle` is the angle itself.
+/// How an angle between neighbouring edges becomes a strain: `tan` is 2 tan(angle/2), a barrier at 180 degrees; `angle`
+/// is the angle itself.
 enum class Measure { tan, angle };
 
-/// How stretch and bending go together: `seed` multiplies bending strains by the stretch, `classical` does not. Axial strains: axialStrain.
+/// How stretch and bending go together: `seed` multiplies bending strains by the stretch, `classical` does not. Axial
+/// strains: axialStrain.
 enum class Energy { seed, classical };
 
-/// Axial strain of an edge: ((l/L)^2 - 1)/2 (`seed`; St. Venant-Kirchhoff in the Green-Lagrange strain) or l/L - 1 (`classical`; Hooke), written so that
-/// small strains keep their digits. The stretch energy is 1/2 k strain^2 L.
+/// Axial strain of an edge: ((l/L)^2 - 1)/2 (`seed`; St. Venant-Kirchhoff in the Green-Lagrange strain) or l/L - 1
+/// (`classical`; Hooke), written so that small strains keep their digits. The stretch energy is 1/2 k strain^2 L.
 template <class T> T axialStrain(Energy energy, const T &length, const T &inverse_rest_length) {
   if (energy == Energy::classical) return length * inverse_rest_length - T(1.0);
   return (length * inverse_rest_length - T(1.0)) * (length * inverse_rest_length + T(1.0)) * T(0.5);
@@ -31,17 +34,16 @@ template <class T> T strainSlope(Energy energy, const T &length, const T &invers
 template <class T> struct CellOf {
   std::array<T, 3> stiffness; ///< (kb1, kb2, kt) / Lbar [N m]
   std::array<T, 3> rest;      ///< strains at which the energy vanishes, integrated over the cell [rad]
-  T base;                     ///< factor of the bending strains = base + weight0 l0 + weight1 l1: lbar / Lbar (`seed`) or 1 (`classical`)
-  std::array<T, 2> weight;    ///< [1/m]
+  T base; ///< factor of the bending strains = base + weight0 l0 + weight1 l1: lbar / Lbar (`seed`) or 1 (`classical`)
+  std::array<T, 2> weight; ///< [1/m]
   std::array<T, 2> free;
   T turns; ///< 2 pi x whole turns in the twist angle (`angle` measure; 0 for `tan`) [rad]
   T sign;  ///< -1 when the number of whole turns is odd, else 1
 };
 
-/// phi(z) = atan(sqrt z)/sqrt z and two derivatives, z = tan^2 of half the turning angle: the factor between the two measures of bending.
-template <class T> struct AngleFactor {
-  T value, first, second;
-};
+/// phi(z) = atan(sqrt z)/sqrt z and two derivatives, z = tan^2 of half the turning angle: the factor between the two
+/// measures of bending.
+template <class T> struct AngleFactor { T value, first, second; };
 template <class T> AngleFactor<T> angleFactor(const T &z) {
   using std::sqrt;
   // Series below z = 0.02, closed form above: both are good to 1e-13 at the seam.
@@ -63,12 +65,12 @@ template <class T> AngleFactor<T> angleFactor(const T &z) {
 
 /// Geometry shared by the strain and its derivatives.
 template <class T> struct CellGeometry {
-  T chi;              ///< 1 + t0.t1
+  T chi;               ///< 1 + t0.t1
   Vector3<T> binormal; ///< curvature binormal 2 t0 x t1 / chi
-  HalfAngle<T> half;  ///< of the twist angle, whole turns included in the signs
-  Vector3<T> d1, d2;  ///< mean directors, carried back to the first tangent
-  T kappa1, kappa2;   ///< binormal . d1, binormal . d2
-  T stretch;          ///< factor of the bending strains
+  HalfAngle<T> half;   ///< of the twist angle, whole turns included in the signs
+  Vector3<T> d1, d2;   ///< mean directors, carried back to the first tangent
+  T kappa1, kappa2;    ///< binormal . d1, binormal . d2
+  T stretch;           ///< factor of the bending strains
 };
 
 template <class T> CellGeometry<T> cellGeometry(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell) {
@@ -100,7 +102,8 @@ template <Measure measure, class T> std::array<T, 3> twistMeasure(const HalfAngl
 
 /// Strains of a cell integrated over it (bending about d1 and d2, twist) [rad], before the rest strains are taken off.
 /// kappa_alpha Lbar = stretch kbar.d_alpha, tau Lbar = 2 tan(angle/2).
-template <Measure measure, class T> std::array<T, 3> cellStrain(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell) {
+template <Measure measure, class T>
+std::array<T, 3> cellStrain(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell) {
   const CellGeometry<T> g = cellGeometry(f0, f1, cell);
   T factor = g.stretch;
   if constexpr (measure == Measure::angle)

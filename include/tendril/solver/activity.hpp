@@ -44,7 +44,8 @@ public:
   std::function<void(const std::string &)> tell; ///< without one, nothing is watched
   double wait = 5;                               ///< before the first line, and between lines [s]
 
-  /// Where work goes on, once an iteration: tells what goes on when nothing has been told for so long. One look at the clock.
+  /// Where work goes on, once an iteration: tells what goes on when nothing has been told for so long. One look at the
+  /// clock.
   void beat() {
     if (tell) look();
   }

@@ -1,11 +1,12 @@
 #pragma once
 /// \file banded.hpp
-/// LDL^T of the Hessians of chains and rings, without pivoting, over edge variables. From the last edge to the first, the vector e_i and the twist of
-/// edge i are eliminated from what the rod beyond it stores as a function of the position x_i and of edge i - 1: with x_{i+1} = x_i + e_i no
-/// differences of positions are formed, and a solve keeps its digits however short the edges are (docs/theory.md, Rounding). Unknowns are those of
-/// the vertex coordinates: a change of variables leaves the inertia, which the signs of the pivots give (Sylvester). A ring has its first
-/// vertex and edge as a border. Rods of the same shape are factored together, one to a lane.
-/// Registered with PETSc as the solver type `banded` for Cholesky.
+/// LDL^T of the Hessians of chains and rings, without pivoting, over edge variables. From the last edge to the first,
+/// the vector e_i and the twist of edge i are eliminated from what the rod beyond it stores as a function of the
+/// position x_i and of edge i - 1: with x_{i+1} = x_i + e_i no differences of positions are formed, and a solve keeps
+/// its digits however short the edges are (docs/theory.md, Rounding). Unknowns are those of the vertex coordinates: a
+/// change of variables leaves the inertia, which the signs of the pivots give (Sylvester). A ring has its first vertex
+/// and edge as a border. Rods of the same shape are factored together, one to a lane. Registered with PETSc as the
+/// solver type `banded` for Cholesky.
 
 #include "tendril/layout/dof_map.hpp"
 
@@ -16,21 +17,26 @@ struct BandedWorkspace {
   AlignedVector factors, rows, copy;
 };
 
-/// What there is to factor: blocks + shift x metric (of positions and twists, and of edge vectors) of the rods that are wanted.
+/// What there is to factor: blocks + shift x metric (of positions and twists, and of edge vectors) of the rods that are
+/// wanted.
 struct BandedSystem {
   const DofMap *dofs = nullptr;
   RodSet rods{0, 0};
   const EdgeBlocks *blocks = nullptr;
   const Planes *metric = nullptr;
-  const std::vector<char> *wanted = nullptr;  ///< per rod of the scene; the others are left out, and a solve gives them zero
+  const std::vector<char> *wanted =
+      nullptr; ///< per rod of the scene; the others are left out, and a solve gives them zero
   const std::vector<double> *shift = nullptr; ///< per rod of the scene
   BandedWorkspace *workspace = nullptr;
-  bool coupled_positions = true;       ///< whether the blocks of vertices have more than a diagonal
-  const double *edge_metric = nullptr; ///< per slot of the scene, of the square of an edge vector's change; or null: none
+  bool coupled_positions = true; ///< whether the blocks of vertices have more than a diagonal
+  const double *edge_metric =
+      nullptr; ///< per slot of the scene, of the square of an edge vector's change; or null: none
 };
 
-/// y += scale x metric x v for one rod, copies behind a ring included in v and in y. `edges`: as BandedSystem::edge_metric.
-void addMetric(const Planes &metric, const double *edges, const RodRange &rod, double scale, const Planes &v, Planes &y);
+/// y += scale x metric x v for one rod, copies behind a ring included in v and in y. `edges`: as
+/// BandedSystem::edge_metric.
+void addMetric(const Planes &metric, const double *edges, const RodRange &rod, double scale, const Planes &v,
+               Planes &y);
 
 class BandedFactor {
 public:
@@ -42,7 +48,8 @@ public:
 
   RodSet rods() const { return rods_; }
   int negativePivots(int rod) const { return negative_[rod - rods_.begin]; }
-  /// Pivots lost in rounding (|pivot| within a few epsilon of its diagonal): motions that cost no energy. A solve leaves them out.
+  /// Pivots lost in rounding (|pivot| within a few epsilon of its diagonal): motions that cost no energy. A solve
+  /// leaves them out.
   int zeroPivots(int rod) const { return zero_[rod - rods_.begin]; }
   std::size_t bytes() const { return bytes_; }
 
@@ -71,8 +78,8 @@ private:
 
 /// Registers `-pc_factor_mat_solver_type banded`.
 PetscErrorCode registerBanded();
-/// Matrix whose entries are those of `system`, which must outlive it; its Cholesky factorisation is `banded`. Increase its state
-/// (PetscObjectStateIncrease) when the values have changed.
+/// Matrix whose entries are those of `system`, which must outlive it; its Cholesky factorisation is `banded`. Increase
+/// its state (PetscObjectStateIncrease) when the values have changed.
 PetscErrorCode createBandedMatrix(BandedSystem *system, Mat *matrix);
 /// The factorisation inside PETSc's factored matrix, or null when it is another's.
 const BandedFactor *bandedFactorOf(Mat factored);

@@ -1,14 +1,17 @@
 #pragma once
 /// \file circulatory.hpp
-/// What the derivative of couples has beyond a symmetric matrix. A couple M fixed in space, or a torque T about the tangent, does the work
-/// (M + T t).phi in a motion whose spin is phi, and no potential has that for its differential: the derivative of its generalised forces
-/// -(M + T t).phi_i by the unknowns j, in the coordinates of the retraction, is the symmetric part that the band holds, and
+/// What the derivative of couples has beyond a symmetric matrix. A couple M fixed in space, or a torque T about the
+/// tangent, does the work (M + T t).phi in a motion whose spin is phi, and no potential has that for its differential:
+/// the derivative of its generalised forces
+/// -(M + T t).phi_i by the unknowns j, in the coordinates of the retraction, is the symmetric part that the band holds,
+/// and
 ///
 ///     A_ij = (M - T t).(phi_i x phi_j)/2
 ///
-/// (the Maurer-Cartan equation of the rotations, in space for M, in the frame for T; structural mechanics calls such forces circulatory, Ziegler
-/// 1968, Principles of Structural Stability). That is of rank two for each couple, so that Newton's direction comes from the factored symmetric
-/// part and two more solves a couple, by the formula of Sherman, Morrison and Woodbury, whatever the linear solver.
+/// (the Maurer-Cartan equation of the rotations, in space for M, in the frame for T; structural mechanics calls such
+/// forces circulatory, Ziegler 1968, Principles of Structural Stability). That is of rank two for each couple, so that
+/// Newton's direction comes from the factored symmetric part and two more solves a couple, by the formula of Sherman,
+/// Morrison and Woodbury, whatever the linear solver.
 
 #include "tendril/solver/incremental_potential.hpp"
 
@@ -24,7 +27,8 @@ public:
   bool isNone() const { return couples_.empty(); }
   bool acts(int rod) const { return counts_[rod - rods_.begin] > 0; }
 
-  /// Takes up the couples at the iterate, and the symmetric part of the Hessian there, which `solve` (right-hand side, solution) solves with.
+  /// Takes up the couples at the iterate, and the symmetric part of the Hessian there, which `solve` (right-hand side,
+  /// solution) solves with.
   using Solve = std::function<PetscErrorCode(const Planes &, Planes &)>;
   PetscErrorCode update(const Solve &solve);
   /// Of the solution of the symmetric part makes that of all of it. False where the latter is singular.

@@ -1,7 +1,7 @@
 #pragma once
 /// \file elimination.hpp
-/// The kernel of `banded`: LDL^T of one rod's matrix over edge variables, or of a pack of rods of one shape, one to a lane; and the solution with it
-/// (docs/theory.md, Rounding).
+/// The kernel of `banded`: LDL^T of one rod's matrix over edge variables, or of a pack of rods of one shape, one to a
+/// lane; and the solution with it (docs/theory.md, Rounding).
 
 #include "tendril/layout/edge_blocks.hpp"
 
@@ -13,8 +13,8 @@ namespace tendril {
 /// Variables of what a rod beyond a vertex stores: the vertex' position and the vector and twist of the edge before it.
 inline constexpr int state_size = 7, edge_at = 3;
 
-/// Inverse of the pivot of a row, its sign counted. What rounding has left of the numbers that were added to it, `scale`, is a zero pivot: its variable
-/// is left out, as if held, with the inverse zero.
+/// Inverse of the pivot of a row, its sign counted. What rounding has left of the numbers that were added to it,
+/// `scale`, is a zero pivot: its variable is left out, as if held, with the inverse zero.
 template <class T> T inversePivot(const T &d, const T &scale, T &negative, T &zero) {
   using std::abs;
   const auto lost = abs(d) <= T(16 * std::numeric_limits<double>::epsilon()) * scale;
@@ -79,12 +79,14 @@ template <> struct Row<Pack> {
 /// A symmetric matrix over the state, or one of the state against a ring's border.
 template <class T> using Square = Row<T>[state_size];
 
-/// What is kept of an edge to solve with: G = A^-1 B, where A is the edge's own matrix and B what it has with the state; L and the inverse pivots of
-/// A = L D L'. An edge whose far vertex is held is known from the position, e = -x: its pivots are zero and its rows of G say so.
+/// What is kept of an edge to solve with: G = A^-1 B, where A is the edge's own matrix and B what it has with the
+/// state; L and the inverse pivots of A = L D L'. An edge whose far vertex is held is known from the position, e = -x:
+/// its pivots are zero and its rows of G say so.
 template <class T> struct Record {
   static constexpr int width = Row<T>::size, lower = edge_size * width, pivots = lower + 6;
   static constexpr int plain = (pivots + edge_size + 7) / 8 * 8; ///< numbers of an edge
-  static constexpr int bordered = plain + edge_size * width;     ///< ... of a ring, with the rows of G for the border behind
+  static constexpr int bordered =
+      plain + edge_size * width; ///< ... of a ring, with the rows of G for the border behind
   static constexpr std::size_t of(const RodRange &rod) { return rod.closed ? bordered : plain; }
 };
 
@@ -123,7 +125,8 @@ template <int n, class T> void solveSmall(const T *lower, const T *inverse, T *x
   }
 }
 
-/// The elimination of one rod, or of a pack of rods of one shape. `Read`: read(plane, i) gives an entry of the blocks at local slot i, shift included.
+/// The elimination of one rod, or of a pack of rods of one shape. `Read`: read(plane, i) gives an entry of the blocks
+/// at local slot i, shift included.
 template <class T, bool ring, class Read> class Elimination {
 public:
   Elimination(const RodRange &rod, const std::vector<char> &held, const Read &read, T *records)
@@ -306,7 +309,8 @@ private:
     Square<T> next;
     for (int r = 0; r < 3; ++r) {
       for (int c = 0; c < 3; ++c)
-        next[r].set(c, (state_[r][c] - state_[r][edge_at + c]) - (state_[edge_at + r][c] - (state_[edge_at + r][edge_at + c] + own(r, c, i))));
+        next[r].set(c, (state_[r][c] - state_[r][edge_at + c]) -
+                           (state_[edge_at + r][c] - (state_[edge_at + r][edge_at + c] + own(r, c, i))));
       const Row<T> before = across(r, i);
       for (int c = edge_at; c < state_size; ++c) {
         next[r].set(c, -before[c]);
@@ -400,7 +404,8 @@ private:
 
 /// Values of the slots of a rod, right-hand side to solution, by the records of its factor.
 template <class T, bool ring>
-[[gnu::flatten]] void substituteAll(const RodRange &rod, const std::vector<char> &held, const T *records, const T *first, T *values) {
+[[gnu::flatten]] void substituteAll(const RodRange &rod, const std::vector<char> &held, const T *records,
+                                    const T *first, T *values) {
   constexpr int w = Record<T>::width;
   constexpr std::size_t size = ring ? Record<T>::bordered : Record<T>::plain;
   const int last = rod.vertices - 1;

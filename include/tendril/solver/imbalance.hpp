@@ -20,12 +20,14 @@ struct Asked {
 /// "rod 'spring' (128 edges)"
 std::string labelOf(const Rod &rod);
 
-/// What of a rod is above its tolerance at the potential's iterate: forces, moments, strains, each with its value, what is asked for, and where it is
-/// largest: "forces out of balance by 0.012 of its load of 9.81 N (asked: 1e-06, -snes_rtol), most at vertex 17". Empty where nothing is.
+/// What of a rod is above its tolerance at the potential's iterate: forces, moments, strains, each with its value, what
+/// is asked for, and where it is largest: "forces out of balance by 0.012 of its load of 9.81 N (asked: 1e-06,
+/// -snes_rtol), most at vertex 17". Empty where nothing is.
 std::string imbalanceOf(IncrementalPotential &potential, int rod, const Asked &asked);
 
 /// The rod whose residual is farthest above its tolerance. \param wanted per rod: whether it counts; -1 where none does
-int farthestRod(IncrementalPotential &potential, RodSet rods, const Asked &asked, const std::vector<char> *wanted = nullptr);
+int farthestRod(IncrementalPotential &potential, RodSet rods, const Asked &asked,
+                const std::vector<char> *wanted = nullptr);
 
 /// To be added to why something failed: "; rod 'spring' (128 edges): forces ..." of that rod, or nothing.
 std::string tellImbalance(IncrementalPotential &potential, int rod, const Asked &asked);

@@ -1,7 +1,7 @@
 #pragma once
 /// \file incremental_potential.hpp
-/// The function one implicit step minimises, on the configuration manifold: the terms of the scene, the iterate, and the moves between iterates.
-/// Rods that nothing joins are independent of each other: everything is done rod by rod.
+/// The function one implicit step minimises, on the configuration manifold: the terms of the scene, the iterate, and
+/// the moves between iterates. Rods that nothing joins are independent of each other: everything is done rod by rod.
 
 #include "tendril/energy/term.hpp"
 #include "tendril/state/retraction.hpp"
@@ -10,14 +10,16 @@
 
 namespace tendril {
 
-/// What makes a step long enough and not too long: an energy that falls enough (Armijo 1966); its slope, too, to a part of what it was
-/// (strong Wolfe conditions, Nocedal and Wright 2006, 3.7); or a residual that falls, whatever the energy does.
+/// What makes a step long enough and not too long: an energy that falls enough (Armijo 1966); its slope, too, to a part
+/// of what it was (strong Wolfe conditions, Nocedal and Wright 2006, 3.7); or a residual that falls, whatever the
+/// energy does.
 enum class LineSearchKind { energy, wolfe, residual };
 
 /// How the minimum is looked for.
 struct SolveSettings {
   RetractionKind retraction = RetractionKind::length; ///< of moves that do not name another
-  /// Where rounding keeps Newton from its tolerance: what is left counts as nothing below this part of what a step moves.
+  /// Where rounding keeps Newton from its tolerance: what is left counts as nothing below this part of what a step
+  /// moves.
   double rounding_tolerance = 1e-3;
   LineSearchKind line_search = LineSearchKind::energy;
   int quasi_newton = 1; ///< iterations that share a factorisation
@@ -29,11 +31,12 @@ public:
 
   IncrementalPotential(const Scene &scene, DofMap &dofs, const Elements &elements, bool dynamic);
 
-  /// Starts a step; then every rod has to be started before anything else is asked of it: its iterate is the start state with supports'
-  /// frames (not yet their positions) moved to the end of the step.
+  /// Starts a step; then every rod has to be started before anything else is asked of it: its iterate is the start
+  /// state with supports' frames (not yet their positions) moved to the end of the step.
   void beginStep(const State &start, const Step &step);
   void beginRod(const State &start, int rod);
-  /// Whether a support has turned its edge past 180 degrees of twist in one step, where the measure `tan` has its barrier.
+  /// Whether a support has turned its edge past 180 degrees of twist in one step, where the measure `tan` has its
+  /// barrier.
   bool beyondBarrier() const { return beyond_barrier_; }
   /// Changes the load factor (in statics also the time) of the step under way; the iterate stays.
   void setLoadFactor(double factor);
@@ -45,10 +48,12 @@ public:
   DofMap &dofs() { return dofs_; }
   RodSet all() const { return dofs_.all(); }
 
-  /// Increments that held vertices of some rods still have to make to reach their prescribed positions; zero elsewhere. True when there are any.
+  /// Increments that held vertices of some rods still have to make to reach their prescribed positions; zero elsewhere.
+  /// True when there are any.
   bool remainingMotion(RodSet rods, Planes &increment) const;
 
-  /// Energy of a rod [J]; +inf where the configuration is impossible. Rounding blurs it by `noise`: differences below decide nothing [J].
+  /// Energy of a rod [J]; +inf where the configuration is impossible. Rounding blurs it by `noise`: differences below
+  /// decide nothing [J].
   struct RodEnergy {
     double value = std::numeric_limits<double>::infinity(), noise = 0;
     double size = 0;                 ///< sum of the energies of all terms without their signs [J]
@@ -76,7 +81,9 @@ public:
 
   /// Trial configuration R(iterate, scale x increment) of one rod, with its axial forces; false when impossible.
   bool tryMove(const Planes &increment, double scale, int rod, RetractionKind kind, Configuration &trial);
-  bool tryMove(const Planes &increment, double scale, int rod, Configuration &trial) { return tryMove(increment, scale, rod, settings.retraction, trial); }
+  bool tryMove(const Planes &increment, double scale, int rod, Configuration &trial) {
+    return tryMove(increment, scale, rod, settings.retraction, trial);
+  }
   /// The same for all rods.
   bool tryMove(const Planes &increment, double scale, Configuration &trial);
   /// Makes the trial of one rod, or of all, the iterate.
@@ -99,31 +106,35 @@ public:
     double force = 0, moment = 0;                                      ///< 1 is the rod's load scale
     double compatibility = 0;                                          ///< largest |strain - S/k|
     double force_floor = 0, moment_floor = 0, compatibility_floor = 0; ///< what rounding leaves, same units
-    void include(const Residual &other);                               ///< the larger of each; not a number is the largest
+    void include(const Residual &other); ///< the larger of each; not a number is the largest
     bool isFinite() const { return std::isfinite(force) && std::isfinite(moment); }
   };
   /// \param energy that of the iterate
   Residual residual(int rod, const RodEnergy &energy);
   /// The largest of each over all rods.
   Residual residual();
-  /// What forces of a rod are measured by [N], and moments by that times its length: its loads, or where it `hasLoad` not, what deforms it.
+  /// What forces of a rod are measured by [N], and moments by that times its length: its loads, or where it `hasLoad`
+  /// not, what deforms it.
   double forceScale(int rod) const { return force_scale_[rod]; }
   bool hasLoad(int rod) const { return load_[rod] > 0; }
   const AxialLaw &axial() const { return axial_; }
 
   /// Displacements of the iterate since the step began, and the rates that follow from them by a rule.
   StageRates stageRates(const StageRule &rule) const;
-  /// Force [N] and moment [N m] of a support on its rod at the iterate, without the inertia of the held vertex itself. \param start of the step
+  /// Force [N] and moment [N m] of a support on its rod at the iterate, without the inertia of the held vertex itself.
+  /// \param start of the step
   std::array<Vec3, 2> supportAction(const State &start, int support);
   const Configuration &start() const { return start_; }
   double length(int rod) const { return length_[rod]; }         ///< at rest [m]
   double shortestEdge(int rod) const { return shortest_[rod]; } ///< at rest [m]
   double longestEdge(int rod) const { return longest_[rod]; }   ///< at rest [m]
-  /// From the last stage of a step to its end at `time`: positions, spins and directors to where the guess of a rule leads (supports to their places),
-  /// axial forces come from the strains. False when that leads to an impossible configuration.
+  /// From the last stage of a step to its end at `time`: positions, spins and directors to where the guess of a rule
+  /// leads (supports to their places), axial forces come from the strains. False when that leads to an impossible
+  /// configuration.
   bool moveOn(double time, const StageRule &end);
 
-  /// State of some rods after the step: positions, directors made orthonormal, axial forces; and the velocities of backward Euler.
+  /// State of some rods after the step: positions, directors made orthonormal, axial forces; and the velocities of
+  /// backward Euler.
   void commitConfiguration(State &state, RodSet rods) const;
   void commit(State &state, RodSet rods) const;
   /// Of all, with the time.
@@ -158,9 +169,10 @@ private:
   RodSet focus_{0, 0};
   int room_ = 0; ///< slots
   enum class Known : char { nothing, gradient, all };
-  std::vector<Known> known_;                                             ///< per rod: what derivatives_ holds of the iterate
-  std::vector<double> load_, force_scale_, length_, shortest_, longest_; ///< per rod: loads [N], or 0; the present scale of forces [N]; lengths [m]
-  std::vector<double> bending_, shortest_cell_;                          ///< per rod: sum of the cells' stiffnesses [N m]; [m]
+  std::vector<Known> known_; ///< per rod: what derivatives_ holds of the iterate
+  std::vector<double> load_, force_scale_, length_, shortest_,
+      longest_; ///< per rod: loads [N], or 0; the present scale of forces [N]; lengths [m]
+  std::vector<double> bending_, shortest_cell_; ///< per rod: sum of the cells' stiffnesses [N m]; [m]
   bool beyond_barrier_ = false;
 
   void commitTime(State &state) const {

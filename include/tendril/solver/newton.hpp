@@ -1,11 +1,12 @@
 #pragma once
 /// \file newton.hpp
-/// One implicit step by SNES: Newton with the exact Hessian, its inertia read at every factorisation, and the line search `retraction`.
+/// One implicit step by SNES: Newton with the exact Hessian, its inertia read at every factorisation, and the line
+/// search `retraction`.
 
-#include "tendril/solver/incremental_potential.hpp"
 #include "tendril/solver/banded.hpp"
 #include "tendril/solver/circulatory.hpp"
 #include "tendril/solver/imbalance.hpp"
+#include "tendril/solver/incremental_potential.hpp"
 
 #include <optional>
 #include <string>
@@ -24,8 +25,8 @@ struct NewtonReport {
   int first_negative_pivots = 0;    ///< at the equilibrium found first, before any escape (statics)
   int escapes = 0;                  ///< saddles left along a direction of negative curvature (statics)
   IncrementalPotential::Residual residual;
-  /// Where rounding kept Newton from its tolerance, and in statics always: what is left to the answer, over rod lengths (root mean square), of the
-  /// worst rod.
+  /// Where rounding kept Newton from its tolerance, and in statics always: what is left to the answer, over rod lengths
+  /// (root mean square), of the worst rod.
   double rounding_error = 0;
   bool lost = false;           ///< in rounding: the failure of the step
   std::vector<double> history; ///< force residual, relative to the load scale, at every iterate
@@ -38,17 +39,19 @@ struct NewtonReport {
 
 /// The largest of the residuals, in units of what it should fall to: `rtol` of its scale.
 double excess(const IncrementalPotential::Residual &residual, double rtol);
-/// Whether all residuals that are too large are at the level that rounding leaves, by an estimate. That says nothing about the answer: it is no verdict.
+/// Whether all residuals that are too large are at the level that rounding leaves, by an estimate. That says nothing
+/// about the answer: it is no verdict.
 bool isAtNoise(const IncrementalPotential::Residual &residual, double rtol);
 
 /// Which equilibria are answers in statics: minima, or any, reached by Newton's own full steps, for following a branch.
 enum class Seek { minimum, equilibrium };
 
-/// Of the Hessian's eigenvalues, in units of the softest bending: where a branch is followed, keeps solves regular where a motion costs nothing, a turn about
-/// an axis, say.
+/// Of the Hessian's eigenvalues, in units of the softest bending: where a branch is followed, keeps solves regular
+/// where a motion costs nothing, a turn about an axis, say.
 constexpr double regular_lift = 1e-7;
 
-/// Edges of the largest scene that statics spend more solves on than its answer takes: on a long way down from a saddle, or to list all critical loads.
+/// Edges of the largest scene that statics spend more solves on than its answer takes: on a long way down from a
+/// saddle, or to list all critical loads.
 constexpr int most_searched_edges = 20000;
 
 /// Where Newton begins instead of at the start of a step.
@@ -74,19 +77,21 @@ struct NewtonWork {
   NewtonWork(const IncrementalPotential &potential, int slots);
   /// Moves the work arrays to the rods from this slot on.
   void setOrigin(int first_slot);
-  std::vector<char> wanted;                            ///< rods that have not converged yet
-  std::vector<double> shift, last_shift;               ///< of the diagonal of indefinite Hessians, now and when it was last needed
-  std::vector<int> negative, zero;                     ///< pivots; of all rods together where the linear solver does not tell them apart
-  std::vector<char> indefinite;                        ///< rods whose Hessian gives no way down as it is
+  std::vector<char> wanted;              ///< rods that have not converged yet
+  std::vector<double> shift, last_shift; ///< of the diagonal of indefinite Hessians, now and when it was last needed
+  std::vector<int> negative, zero; ///< pivots; of all rods together where the linear solver does not tell them apart
+  std::vector<char> indefinite;    ///< rods whose Hessian gives no way down as it is
   std::vector<IncrementalPotential::RodEnergy> energy; ///< at the iterate, ...
   std::vector<char> energy_known;                      ///< ... where it has been computed
   std::vector<IncrementalPotential::Residual> residual;
   std::vector<char> moving; ///< rods whose supports have not reached their places
   std::vector<Standstill> standstill;
-  std::vector<double> left;                    ///< of the answer, over the rod's length: what Newton would still move it by; 0 where the tolerance was met
-  std::vector<double> load_reach, load_energy; ///< what the loads would move, and the energy of that [J]; not a number where not known
-  Planes increment, coordinates;               ///< work arrays
-  Configuration trial, kept;                   ///< `kept`: the iterate while another is tried in its place
+  std::vector<double>
+      left; ///< of the answer, over the rod's length: what Newton would still move it by; 0 where the tolerance was met
+  std::vector<double> load_reach,
+      load_energy; ///< what the loads would move, and the energy of that [J]; not a number where not known
+  Planes increment, coordinates; ///< work arrays
+  Configuration trial, kept;     ///< `kept`: the iterate while another is tried in its place
   Planes motion, metric;
   std::vector<double> edge_metric; ///< per slot
   BandedWorkspace workspace;
@@ -97,17 +102,18 @@ class NewtonSolver {
 public:
   /// Creates SNES and its parts and reads -snes_*, -ksp_*, -pc_*, -mat_* options.
   PetscErrorCode setUp(IncrementalPotential &potential, NewtonWork &work, RodSet rods);
-  /// Minimises the potential of the step, which has begun. The potential's iterate is the answer when `report` says converged.
-  /// \param guess where to begin instead of at the start state
-  /// \param patience iterations after which it fails; 0: as many as -snes_max_it
+  /// Minimises the potential of the step, which has begun. The potential's iterate is the answer when `report` says
+  /// converged. \param guess where to begin instead of at the start state \param patience iterations after which it
+  /// fails; 0: as many as -snes_max_it
   PetscErrorCode solve(const State &start, NewtonReport *report, Seek seek, const Guess *guess, int patience = 0);
   /// Sets up the linear solver with the matrix assembled last, for the mistakes in its options to come to light.
   PetscErrorCode setUpLinear();
   /// Factors the Hessian at the iterate and counts negative pivots; -1 when it cannot be factored.
   /// \param lift of its eigenvalues, in units of the softest bending of each rod
   PetscErrorCode inertiaAtIterate(int *negative, double lift = 0);
-  /// The unstable motion at the iterate by whose loss the count of unstable motions falls to `stable`, if it takes a higher lift than `lift`, which then is
-  /// that lift. The edge that turns most turns by one radian. \see inertiaAtIterate
+  /// The unstable motion at the iterate by whose loss the count of unstable motions falls to `stable`, if it takes a
+  /// higher lift than `lift`, which then is that lift. The edge that turns most turns by one radian. \see
+  /// inertiaAtIterate
   PetscErrorCode criticalMode(int stable, double *lift, Planes *mode);
   /// Solves with the matrix factored last.
   PetscErrorCode solveLinear(const Planes &right, Planes &solution);
@@ -138,10 +144,11 @@ private:
   PetscObjectState iterate_state_ = 0;     ///< ... and its state when they were written
   NewtonReport report_;
   Seek seek_ = Seek::minimum;
-  bool follows_ = false; ///< whether the solve is for an equilibrium of any kind
+  bool follows_ = false;            ///< whether the solve is for an equilibrium of any kind
   int patience_ = 0, spent_ = 0;    ///< iterations that the solve may take, 0: no bound; and those before SNES began
   double sharpness_ = 1, rtol_ = 0; ///< of -snes_rtol, and what is asked for now
-  /// A step and what it changed of the gradient, by unknowns; per rod one over their product, 0 where that is not positive (BFGS).
+  /// A step and what it changed of the gradient, by unknowns; per rod one over their product, 0 where that is not
+  /// positive (BFGS).
   struct Secant {
     std::vector<double> step, change, inverse;
   };

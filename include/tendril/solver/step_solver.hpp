@@ -1,7 +1,8 @@
 #pragma once
 /// \file step_solver.hpp
-/// One implicit step of the whole scene. Rods that nothing joins are independent of each other: they are solved in blocks small enough to stay in
-/// the cache, a SNES each. Other linear solvers than `banded` get the whole scene as one system.
+/// One implicit step of the whole scene. Rods that nothing joins are independent of each other: they are solved in
+/// blocks small enough to stay in the cache, a SNES each. Other linear solvers than `banded` get the whole scene as one
+/// system.
 
 #include "tendril/solver/newton.hpp"
 
@@ -11,16 +12,18 @@
 
 namespace tendril {
 
-/// Whether independent rods may be solved one block after the other, or must form one system (paths of equilibria share a load factor).
+/// Whether independent rods may be solved one block after the other, or must form one system (paths of equilibria share
+/// a load factor).
 enum class Coupling { none, load };
 
 class StepSolver {
 public:
   PetscErrorCode setUp(IncrementalPotential &potential, Coupling coupling = Coupling::none);
-  /// Minimises the potential of the step. The potential's iterate is the answer when `report` says converged; iterations are the most of any block.
-  /// In statics, where fine rods take many iterations, they begin again from the answer with fewer edges (solveCoarse).
-  /// \param guess where to begin instead of at the start state
-  PetscErrorCode solve(const State &start, const Step &step, NewtonReport *report, Seek seek = Seek::minimum, const Guess *guess = nullptr);
+  /// Minimises the potential of the step. The potential's iterate is the answer when `report` says converged;
+  /// iterations are the most of any block. In statics, where fine rods take many iterations, they begin again from the
+  /// answer with fewer edges (solveCoarse). \param guess where to begin instead of at the start state
+  PetscErrorCode solve(const State &start, const Step &step, NewtonReport *report, Seek seek = Seek::minimum,
+                       const Guess *guess = nullptr);
   bool coarse_first = false; ///< whether fine rods begin from fewer edges without a try of their own
   /// Called with each block that has converged, while it is in the cache.
   std::function<void(RodSet)> on_block;
@@ -31,8 +34,8 @@ public:
   /// Factors the Hessian at the iterate and counts negative pivots; -1 when it cannot be factored.
   /// \param lift of its eigenvalues, in units of the softest bending of each rod
   PetscErrorCode inertiaAtIterate(int *negative, double lift = 0);
-  /// The motion at the iterate without which no more than `stable` motions would be unstable with their eigenvalues lifted by `neutral`; `found` is false
-  /// where there is none. The edge that turns most turns by one radian.
+  /// The motion at the iterate without which no more than `stable` motions would be unstable with their eigenvalues
+  /// lifted by `neutral`; `found` is false where there is none. The edge that turns most turns by one radian.
   PetscErrorCode criticalMode(int stable, double neutral, Planes *mode, bool *found);
 
   IncrementalPotential &potential() { return *potential_; }

@@ -1,15 +1,16 @@
 #pragma once
 /// \file retraction.hpp
-/// Moving along the configuration manifold: from a configuration, by increments of the unknowns, to another configuration.
+/// Moving along the configuration manifold: from a configuration, by increments of the unknowns, to another
+/// configuration.
 
 #include "tendril/state/state.hpp"
 
 namespace tendril {
 
-/// `additive` adds the increments to the positions. `length` gives every edge its linearised new length t.(e + de) along its new direction,
-/// so that turning an edge does not stretch it: the stretching energy no longer limits the step (docs/theory.md, Retraction).
-/// `continued` lengthens edges as the last step did, where the increments are that step's: (l^2 - |e - de|^2)/2l, which is not t.de.
-/// `kept` turns edges without lengthening them.
+/// `additive` adds the increments to the positions. `length` gives every edge its linearised new length t.(e + de)
+/// along its new direction, so that turning an edge does not stretch it: the stretching energy no longer limits the
+/// step (docs/theory.md, Retraction). `continued` lengthens edges as the last step did, where the increments are that
+/// step's: (l^2 - |e - de|^2)/2l, which is not t.de. `kept` turns edges without lengthening them.
 enum class RetractionKind { additive, length, continued, kept };
 
 class Retraction {
@@ -19,10 +20,11 @@ public:
   /// Inertia of a step, 1/dt^2 [1/s^2]; weighs the corrections of spans held at both ends.
   void setInverseTimeSquared(double value);
 
-  /// Writes rod `r` of `to` = R(from, scale * increment), all but its axial force. Directors are carried by the minimal rotation between
-  /// tangents and turned by the twist increments. False when an edge vanishes or turns back on itself.
+  /// Writes rod `r` of `to` = R(from, scale * increment), all but its axial force. Directors are carried by the minimal
+  /// rotation between tangents and turned by the twist increments. False when an edge vanishes or turns back on itself.
   /// \param increment x, y, z and twist of every slot, copies behind rings included
-  bool apply(const Configuration &from, const Planes &increment, double scale, int rod, RetractionKind kind, Configuration &to);
+  bool apply(const Configuration &from, const Planes &increment, double scale, int rod, RetractionKind kind,
+             Configuration &to);
 
 private:
   const Elements &elements_;

@@ -1,6 +1,7 @@
 #pragma once
 /// \file stage.hpp
-/// How displacements, velocities and accelerations hang together in one stage of a time step: all that an integrator tells the incremental potential.
+/// How displacements, velocities and accelerations hang together in one stage of a time step: all that an integrator
+/// tells the incremental potential.
 
 #include "tendril/state/state.hpp"
 
@@ -38,7 +39,8 @@ private:
 };
 
 /// With d the displacements and spins since the start of the step:
-///   velocity v = d/dt + `velocity`,   acceleration = (mass v + `acceleration`)/dt,   strain rate = (strain - its value at the start)/damping_dt,
+///   velocity v = d/dt + `velocity`,   acceleration = (mass v + `acceleration`)/dt,   strain rate = (strain - its value
+///   at the start)/damping_dt,
 /// where the start's strain s gets weight (s - strains) on top for each of `damping_past`.
 struct StageRule {
   double fraction = 1; ///< of the step: forces balance, and supports are, at that time
@@ -51,16 +53,20 @@ struct StageRule {
     const double *strains; ///< as strainsOf
   };
   std::vector<PastStrains> damping_past;
-  bool tangent_rates = false;  ///< strain rates are those of the velocities (strainsBehind) instead
-  Combination guess;           ///< of d, to start Newton from [m]
-  Combination halfway;         ///< of d, half-way in time to the guess: frames follow the curve through both (carryFrames); empty: a great circle [m]
-  const Rates *half = nullptr; ///< displacements to the middle of the step: axial forces come from the mean of the strains at both its ends (AxialLaw)
+  bool tangent_rates = false; ///< strain rates are those of the velocities (strainsBehind) instead
+  Combination guess;          ///< of d, to start Newton from [m]
+  Combination halfway; ///< of d, half-way in time to the guess: frames follow the curve through both (carryFrames);
+                       ///< empty: a great circle [m]
+  const Rates *half = nullptr; ///< displacements to the middle of the step: axial forces come from the mean of the
+                               ///< strains at both its ends (AxialLaw)
 };
 
-/// Frames of a rod from which a stage measures twist: those of the start, carried to where the guess leads. Twist inertia then acts on positions by
-/// the small turn from there; from the start itself, that would be an error of first order in the step. Between a curve on the sphere of tangents and its
-/// chord lies 4/3 of the triangle with the curve's middle, but for terms of fifth order in the step; by that angle frames turn on top where `halfway` is known.
-void carryFrames(const StageRule &rule, const Elements &elements, int rod, const Configuration &from, Configuration &reference);
+/// Frames of a rod from which a stage measures twist: those of the start, carried to where the guess leads. Twist
+/// inertia then acts on positions by the small turn from there; from the start itself, that would be an error of first
+/// order in the step. Between a curve on the sphere of tangents and its chord lies 4/3 of the triangle with the curve's
+/// middle, but for terms of fifth order in the step; by that angle frames turn on top where `halfway` is known.
+void carryFrames(const StageRule &rule, const Elements &elements, int rod, const Configuration &from,
+                 Configuration &reference);
 
 /// What a stage found.
 struct StageRates {

@@ -19,18 +19,22 @@ struct Rates {
 struct State {
   double time = 0;
   std::int64_t step = 0;
-  std::vector<Vec3> position;      ///< (nv) [m]
-  std::vector<Vec3> position_low;  ///< (nv) what rounding to `position` has left of it; edges are differences of both words [m]
+  std::vector<Vec3> position; ///< (nv) [m]
+  std::vector<Vec3>
+      position_low; ///< (nv) what rounding to `position` has left of it; edges are differences of both words [m]
   std::vector<Vec3> director;      ///< (ne) first directors
   std::vector<Vec3> velocity;      ///< (nv) [m/s]
   std::vector<double> twist_rate;  ///< (ne) [rad/s]
   std::vector<double> axial_force; ///< (ne) [N]
-  std::vector<double> turns;       ///< (cells) 2 pi x whole turns of the twist angle, carried by continuity (`angle` measure) [rad]
-  double last_dt = 0;              ///< length of the step that led here; 0 where the integrator remembers nothing [s]
-  double dt_before = 0;            ///< of the step before that; 0 where there was none [s]
-  std::vector<Rates> memory;       ///< what the integrator remembers of steps before
-  std::vector<double> strains;     ///< before the last step, as strainsOf, then before the one before; where the integrator wants them
-  /// What supports that move did at the end of the last step, then of the one before (SupportActions); where the integrator wants them.
+  std::vector<double>
+      turns;          ///< (cells) 2 pi x whole turns of the twist angle, carried by continuity (`angle` measure) [rad]
+  double last_dt = 0; ///< length of the step that led here; 0 where the integrator remembers nothing [s]
+  double dt_before = 0;      ///< of the step before that; 0 where there was none [s]
+  std::vector<Rates> memory; ///< what the integrator remembers of steps before
+  std::vector<double>
+      strains; ///< before the last step, as strainsOf, then before the one before; where the integrator wants them
+  /// What supports that move did at the end of the last step, then of the one before (SupportActions); where the
+  /// integrator wants them.
   std::vector<Vec3> support_actions;
 
   bool operator==(const State &) const = default;
@@ -38,8 +42,8 @@ struct State {
 
 State initialState(const Scene &scene, const Elements &elements);
 
-/// A point of the configuration manifold with its derived frames, over slots: the iterate of a step. Whatever is no edge has a unit frame at
-/// rest, so that whole packs can be worked on.
+/// A point of the configuration manifold with its derived frames, over slots: the iterate of a step. Whatever is no
+/// edge has a unit frame at rest, so that whole packs can be worked on.
 class Configuration {
 public:
   /// First planes of what is stored.
@@ -48,13 +52,15 @@ public:
     tangent = 3,
     director = 6,
     length = 9,
-    /// Axial strain, computed once: compilers contract the formula differently from place to place, and a stiff rod turns that last bit into forces.
+    /// Axial strain, computed once: compilers contract the formula differently from place to place, and a stiff rod
+    /// turns that last bit into forces.
     strain = 10,
     spin = 11,  ///< turning of each director since the step began, summed over retractions [rad]
     turns = 12, ///< of cells, as in State
     twist = 13, ///< twist angle of cells with whole turns [rad]
     axial_force = 14,
-    /// Second word of the position: edges and displacements are known to rounding of their own size, not to that of the coordinates.
+    /// Second word of the position: edges and displacements are known to rounding of their own size, not to that of the
+    /// coordinates.
     position_low = 15,
     planes = 18
   };
@@ -70,7 +76,8 @@ public:
   void setFrame(int slot, const Frame &f);
   /// Frames of a slot or of a pack of them.
   template <class T> FrameOf<T> frames(int slot) const {
-    return {readVector<T>(values_, tangent, slot), readVector<T>(values_, director, slot), read<T>((*this)[length] + slot)};
+    return {readVector<T>(values_, tangent, slot), readVector<T>(values_, director, slot),
+            read<T>((*this)[length] + slot)};
   }
   template <class T> Vector3<T> positions(int slot) const { return readVector<T>(values_, position, slot); }
   /// Edge vectors x_{i+1} - x_i.
@@ -80,7 +87,9 @@ public:
     return (positions<T>(slot) - from.positions<T>(from_slot)) +
            (readVector<T>(values_, position_low, slot) - readVector<T>(from.values_, position_low, from_slot));
   }
-  template <class T> Vector3<T> displacements(int slot, const Configuration &from) const { return displacements<T>(slot, from, slot); }
+  template <class T> Vector3<T> displacements(int slot, const Configuration &from) const {
+    return displacements<T>(slot, from, slot);
+  }
   Vec3 displacementAt(int slot, const Configuration &from) const { return displacements<double>(slot, from); }
   void setPosition(int slot, const Vec3 &high, const Vec3 &low) {
     values_.setVector(position, slot, high);
@@ -111,11 +120,12 @@ void setRod(const State &state, const Elements &elements, int rod, Configuration
 /// Present frame of a support.
 Frame supportFrame(const Support &support, double motion_time);
 
-/// Visits the cells of a rod: `visit(slot, frame0, frame1, count)`, as Packs of `count` regular cells, then one by one the loose ones
-/// (template argument double). The tail of the last pack has no cells: its constants are zero.
+/// Visits the cells of a rod: `visit(slot, frame0, frame1, count)`, as Packs of `count` regular cells, then one by one
+/// the loose ones (template argument double). The tail of the last pack has no cells: its constants are zero.
 template <class Visit> void forCells(const Elements &elements, int rod, Visit visit) {
   const int end = elements.cell_end[rod];
-  for (int s = elements.cell_begin[rod]; s < end; s += lanes) visit.template operator()<Pack>(LooseCell{s, s - 1, s, s}, std::min(lanes, end - s));
+  for (int s = elements.cell_begin[rod]; s < end; s += lanes)
+    visit.template operator()<Pack>(LooseCell{s, s - 1, s, s}, std::min(lanes, end - s));
   for (const LooseCell &cell : elements.loose[rod]) visit.template operator()<double>(cell, 1);
 }
 
@@ -138,7 +148,8 @@ template <class T> std::array<FrameOf<T>, 2> cellFrames(const Configuration &c, 
 inline Pack spinOver(const Configuration &start, const Configuration &now, int slot) {
   using std::floor;
   const Pack principal = halfAngleBetween(start.frames<Pack>(slot), now.frames<Pack>(slot)).angle();
-  const Pack turns = Pack(2 * pi) * floor((read<Pack>(now[Configuration::spin] + slot) - principal) * Pack(0.5 / pi) + Pack(0.5));
+  const Pack turns =
+      Pack(2 * pi) * floor((read<Pack>(now[Configuration::spin] + slot) - principal) * Pack(0.5 / pi) + Pack(0.5));
   return principal + turns;
 }
 

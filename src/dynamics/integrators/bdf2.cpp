@@ -1,4 +1,5 @@
-/// Backward differentiation of second order with steps h after h/w, L-stable. With r = (1 + 2w)/(1 + w) and c = w^2/(1 + w),
+/// Backward differentiation of second order with steps h after h/w, L-stable. With r = (1 + 2w)/(1 + w) and c = w^2/(1
+/// + w),
 ///   v = (r d - c d_last)/h,   a = (r (v - v_n) - c (v_n - v_last))/h
 /// A state without memory is left by a step of sdirk2.
 #include "tendril/dynamics/integrator.hpp"
@@ -33,7 +34,10 @@ public:
   Combination error(const State &start, double h, const Stages &done) const override {
     if (start.memory.empty()) return first_->error(start, h, done);
     const double w = h / start.last_dt, r = (1 + 2 * w) / (1 + w), third = h * h / (3 * r);
-    return Combination().add(third / h, done[0].velocity).add(-third * (1 + w) / h, start).add(third * w / h, start.memory[velocity]);
+    return Combination()
+        .add(third / h, done[0].velocity)
+        .add(-third * (1 + w) / h, start)
+        .add(third * w / h, start.memory[velocity]);
   }
 
   void finish(State &state, double h, const Stages &done) const override {

@@ -1,9 +1,9 @@
-/// Backward differentiation of third order, after steps h_1 and h_2: v is the slope, at the end of the step, of the cubic through four positions, and a is that
-/// of four velocities. With H1 = h + h_1, H2 = H1 + h_2, r = 1 + h/H1 + h/H2, p = h H1/(H2 (h_1 + h_2)), q = h/H1 + h/H2 + p and the chords d_1/h_1 and
-/// d_2/h_2,
+/// Backward differentiation of third order, after steps h_1 and h_2: v is the slope, at the end of the step, of the
+/// cubic through four positions, and a is that of four velocities. With H1 = h + h_1, H2 = H1 + h_2, r = 1 + h/H1 +
+/// h/H2, p = h H1/(H2 (h_1 + h_2)), q = h/H1 + h/H2 + p and the chords d_1/h_1 and d_2/h_2,
 ///   v = (r d/h - q d_1/h_1 + p d_2/h_2),   a = r (v - v_n)/h - q (v_n - v_1)/h_1 + p (v_1 - v_2)/h_2
-/// Stable for what decays within 86 degrees of the negative axis; undamped motion at omega h < 1.94 grows, by (omega h)^4/4 in a step where that is small.
-/// Two steps of sdirk33 come first.
+/// Stable for what decays within 86 degrees of the negative axis; undamped motion at omega h < 1.94 grows, by (omega
+/// h)^4/4 in a step where that is small. Two steps of sdirk33 come first.
 #include "tendril/dynamics/integrator.hpp"
 
 namespace tendril {
@@ -24,7 +24,9 @@ public:
     const double now = h / (6 * w.H1), before = now * h / w.h1;
     return {0.5 - now, 0.5 + now + before, -before};
   }
-  PetscErrorCode begin(StepSolver &solver, double h, State &state) const override { return first_->begin(solver, h, state); }
+  PetscErrorCode begin(StepSolver &solver, double h, State &state) const override {
+    return first_->begin(solver, h, state);
+  }
 
   StageRule stage(const State &start, double h, const Stages &done) const override {
     if (begins(start)) return first_->stage(start, h, done);
@@ -41,7 +43,8 @@ public:
     };
     predict(rule.guess, h);
     predict(rule.halfway, 0.5 * h);
-    if (!start.strains.empty()) rule.damping_past = {{q + p, start.strains.data()}, {-p, start.strains.data() + start.strains.size() / 2}};
+    if (!start.strains.empty())
+      rule.damping_past = {{q + p, start.strains.data()}, {-p, start.strains.data() + start.strains.size() / 2}};
     return rule;
   }
 
@@ -63,21 +66,29 @@ public:
     mean = done.back().displacement;
     for (Vec3 &v : mean.vertex) v /= h;
     for (double &v : mean.edge) v /= h;
-    last = {std::exchange(state.velocity, done.back().velocity.vertex), std::exchange(state.twist_rate, done.back().velocity.edge)};
+    last = {std::exchange(state.velocity, done.back().velocity.vertex),
+            std::exchange(state.twist_rate, done.back().velocity.edge)};
     if (state.memory.size() == 1) // before the second step
       memory.push_back(done.back().acceleration);
     else
-      memory.insert(memory.end(), std::make_move_iterator(state.memory.begin()), std::make_move_iterator(state.memory.begin() + 2));
+      memory.insert(memory.end(), std::make_move_iterator(state.memory.begin()),
+                    std::make_move_iterator(state.memory.begin() + 2));
     state.memory = std::move(memory);
   }
 
 private:
-  enum : std::size_t { chord1, velocity1, chord2, velocity2 }; ///< over the last step and at its start, and those of the step before
+  enum : std::size_t {
+    chord1,
+    velocity1,
+    chord2,
+    velocity2
+  }; ///< over the last step and at its start, and those of the step before
   static bool begins(const State &start) { return start.memory.size() <= velocity2; }
   struct Weights {
     double h1, h2, H1, H2, r, p, q;
     Weights(const State &start, double h)
-        : h1(start.last_dt), h2(start.dt_before), H1(h + h1), H2(H1 + h2), r(1 + h / H1 + h / H2), p(h * H1 / (H2 * (h1 + h2))), q(h / H1 + h / H2 + p) {}
+        : h1(start.last_dt), h2(start.dt_before), H1(h + h1), H2(H1 + h2), r(1 + h / H1 + h / H2),
+          p(h * H1 / (H2 * (h1 + h2))), q(h / H1 + h / H2 + p) {}
   };
   std::unique_ptr<Integrator> first_;
 };

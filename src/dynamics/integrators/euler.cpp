@@ -18,7 +18,9 @@ public:
   }
 
   /// h^2/2 x''.
-  Combination error(const State &, double h, const Stages &done) const override { return Combination().add(0.5 * h * h, done[0].acceleration); }
+  Combination error(const State &, double h, const Stages &done) const override {
+    return Combination().add(0.5 * h * h, done[0].acceleration);
+  }
 
   void finish(State &state, double, const Stages &done) const override {
     state.velocity = done[0].velocity.vertex;

@@ -1,8 +1,9 @@
-/// Generalized-alpha (Chung and Hulbert 1993) with forces in balance at the ends of steps (Arnold and Bruels 2007). Accelerations a of the motion and A of the
-/// method:
+/// Generalized-alpha (Chung and Hulbert 1993) with forces in balance at the ends of steps (Arnold and Bruels 2007).
+/// Accelerations a of the motion and A of the method:
 ///   (1 - am) A_n+1 + am A_n = (1 - af) a_n+1 + af a_n
 ///   d = h v_n + h^2 ((1/2 - b) A_n + b A_n+1),   v_n+1 = v_n + h ((1 - c) A_n + c A_n+1)
-/// am = (2 rho - 1)/(rho + 1), af = rho/(rho + 1), c = 1/2 - am + af, b = (1 - am + af)^2/4. A lags behind a by (af - am) h.
+/// am = (2 rho - 1)/(rho + 1), af = rho/(rho + 1), c = 1/2 - am + af, b = (1 - am + af)^2/4. A lags behind a by (af -
+/// am) h.
 #include "tendril/dynamics/integrator.hpp"
 
 namespace tendril {
@@ -11,8 +12,8 @@ namespace {
 class GeneralizedAlpha final : public Integrator {
 public:
   explicit GeneralizedAlpha(const IntegratorSettings &settings)
-      : am_((2 * settings.rho_inf - 1) / (settings.rho_inf + 1)), af_(settings.rho_inf / (settings.rho_inf + 1)), c_(0.5 - am_ + af_),
-        b_(0.25 * (1 - am_ + af_) * (1 - am_ + af_)) {}
+      : am_((2 * settings.rho_inf - 1) / (settings.rho_inf + 1)), af_(settings.rho_inf / (settings.rho_inf + 1)),
+        c_(0.5 - am_ + af_), b_(0.25 * (1 - am_ + af_) * (1 - am_ + af_)) {}
 
   int remembersStrains() const override { return 1; }
   int remembersActions() const override { return 1; }
@@ -46,7 +47,8 @@ public:
     return rule;
   }
 
-  /// From the leading error of its frequencies, (b - 1/12 - (af - am) af) h^2 x'' x''/2: a half of that h^3 x''' in a step.
+  /// From the leading error of its frequencies, (b - 1/12 - (af - am) af) h^2 x'' x''/2: a half of that h^3 x''' in a
+  /// step.
   Combination error(const State &start, double h, const Stages &done) const override {
     const double third = 0.5 * (b_ - 1.0 / 12 + (am_ - af_) * af_) * h * h;
     return Combination().add(third, done[0].acceleration).add(-third, start.memory[motion]);
@@ -77,6 +79,8 @@ private:
 
 } // namespace
 
-std::unique_ptr<Integrator> makeGeneralizedAlpha(const IntegratorSettings &settings) { return std::make_unique<GeneralizedAlpha>(settings); }
+std::unique_ptr<Integrator> makeGeneralizedAlpha(const IntegratorSettings &settings) {
+  return std::make_unique<GeneralizedAlpha>(settings);
+}
 
 } // namespace tendril

@@ -20,7 +20,8 @@ constexpr Entry entries[] = {
     {"midpoint", "second order, keeps the energy within a band, damps nothing", makeMidpoint},
     {"generalized_alpha", "second order, damps high frequencies by -rho_inf", makeGeneralizedAlpha},
     {"symplectic2", "as midpoint, of two stages: half its step at twice its cost", makeSymplectic2},
-    {"energy_momentum", "midpoint that keeps the energy of stiff rods, too, two to five solves a step", makeEnergyMomentum},
+    {"energy_momentum", "midpoint that keeps the energy of stiff rods, too, two to five solves a step",
+     makeEnergyMomentum},
 };
 
 } // namespace
@@ -41,13 +42,17 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
     const double moment = 1e-3 * h; // long enough for the strains to change by more than their rounding
     Planes back = potential.dofs().makePlanes();
     for (const RodRange &rod : elements.rods) {
-      for (int i = 0; i < rod.vertices; ++i) back.setVector(0, rod.slot(i), -moment * elements.freedom()[rod.slot(i)] * state.velocity[rod.first_vertex + i]);
-      for (int i = 0; rod.twist && i < rod.edges; ++i) back[3][rod.slot(i)] = -moment * state.twist_rate[rod.first_edge + i];
+      for (int i = 0; i < rod.vertices; ++i)
+        back.setVector(0, rod.slot(i),
+                       -moment * elements.freedom()[rod.slot(i)] * state.velocity[rod.first_vertex + i]);
+      for (int i = 0; rod.twist && i < rod.edges; ++i)
+        back[3][rod.slot(i)] = -moment * state.twist_rate[rod.first_edge + i];
       potential.dofs().copyBehindRing(rod, back);
     }
     Configuration earlier;
     bool possible = true;
-    for (int r = 0; r < potential.all().end; ++r) possible = potential.tryMove(back, 1, r, RetractionKind::additive, earlier) && possible;
+    for (int r = 0; r < potential.all().end; ++r)
+      possible = potential.tryMove(back, 1, r, RetractionKind::additive, earlier) && possible;
     if (possible) {
       before = strainsOf(elements, earlier);
       rest.damping_dt = moment;
@@ -62,11 +67,13 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
     const double damping = potential.scene().rods[r].material.mass_damping_coefficient;
     for (int i = 0; i < rod.vertices; ++i) {
       const int s = rod.slot(i), v = rod.first_vertex + i;
-      if (elements.freedom()[s] != 0 && elements.mass()[s] > 0) a.vertex[v] = -force.vector(0, s) / elements.mass()[s] - damping * state.velocity[v];
+      if (elements.freedom()[s] != 0 && elements.mass()[s] > 0)
+        a.vertex[v] = -force.vector(0, s) / elements.mass()[s] - damping * state.velocity[v];
     }
     for (int i = 0; rod.twist && i < rod.edges; ++i) {
       const int s = rod.slot(i), e = rod.first_edge + i;
-      if (elements.twistMass()[s] > 0) a.edge[e] = -force[3][s] / elements.twistMass()[s] - damping * state.twist_rate[e];
+      if (elements.twistMass()[s] > 0)
+        a.edge[e] = -force[3][s] / elements.twistMass()[s] - damping * state.twist_rate[e];
     }
   }
   return a;
@@ -76,7 +83,8 @@ std::vector<double> strainsBehind(StepSolver &solver, const State &start, const 
   IncrementalPotential &potential = solver.potential();
   const Elements &elements = potential.elements();
   const StageRule &rule = *stage.rule;
-  const double moment = 1e-3; // of damping_dt: long enough for the strains to change by more than their rounding, and its square is nothing
+  const double moment = 1e-3; // of damping_dt: long enough for the strains to change by more than their rounding, and
+                              // its square is nothing
   Planes moved = potential.dofs().makePlanes();
   Configuration there;
   auto at = [&](double later) { // supports, too
@@ -87,7 +95,9 @@ std::vector<double> strainsBehind(StepSolver &solver, const State &start, const 
     for (const RodRange &rod : elements.rods) {
       for (int i = 0; i < rod.vertices; ++i) {
         const int v = rod.first_vertex + i;
-        moved.setVector(0, rod.slot(i), elements.freedom()[rod.slot(i)] * (along * rule.guess.atVertex(v) + later * rule.velocity.atVertex(v)));
+        moved.setVector(0, rod.slot(i),
+                        elements.freedom()[rod.slot(i)] *
+                            (along * rule.guess.atVertex(v) + later * rule.velocity.atVertex(v)));
       }
       for (int i = 0; rod.twist && i < rod.edges; ++i) {
         const int e = rod.first_edge + i;
@@ -108,7 +118,8 @@ std::vector<double> strainsBehind(StepSolver &solver, const State &start, const 
   const std::vector<double> first = strainsOf(elements, potential.start());
   for (std::size_t k = 0; k < behind.size(); ++k) {
     double difference = first[k];
-    for (const StageRule::PastStrains &past : rule.damping_past) difference += past.weight * (first[k] - past.strains[k]);
+    for (const StageRule::PastStrains &past : rule.damping_past)
+      difference += past.weight * (first[k] - past.strains[k]);
     behind[k] -= (after[k] - before[k]) / (2 * moment);
     if (!(std::abs(behind[k] - difference) < far)) behind[k] = difference;
   }

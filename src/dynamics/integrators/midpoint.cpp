@@ -1,10 +1,11 @@
-/// Implicit midpoint: v = d/(h/2), a = (v - v_n)/(h/2) in the middle of the step; its end lies as far beyond, v_n+1 = 2 v - v_n. Keeps linear momentum and what
-/// is quadratic in the motion; the energy stays within a band. Nothing damps stiff motions.
-/// With the axial force of an edge from the mean S of its strains at both ends of the step instead of its strain in the middle, what it does over the step is
-/// what the edge stores: strains are quadratic in positions, so that their change is B(middle) times the displacement (Simo, Tarnow and Doblare 1995). But
-/// S B(middle) is no gradient: d S = (m + de)/L^2, while the force points along the middle's edge m. So a step solves first for the middle, then with
-/// |de|^2/(2 L^2), what the mean has on top of the strain in the middle, as the solve before found it, until one iteration of Newton's method is enough. Each
-/// is a potential with forces along m.
+/// Implicit midpoint: v = d/(h/2), a = (v - v_n)/(h/2) in the middle of the step; its end lies as far beyond, v_n+1 = 2
+/// v - v_n. Keeps linear momentum and what is quadratic in the motion; the energy stays within a band. Nothing damps
+/// stiff motions. With the axial force of an edge from the mean S of its strains at both ends of the step instead of
+/// its strain in the middle, what it does over the step is what the edge stores: strains are quadratic in positions, so
+/// that their change is B(middle) times the displacement (Simo, Tarnow and Doblare 1995). But S B(middle) is no
+/// gradient: d S = (m + de)/L^2, while the force points along the middle's edge m. So a step solves first for the
+/// middle, then with |de|^2/(2 L^2), what the mean has on top of the strain in the middle, as the solve before found
+/// it, until one iteration of Newton's method is enough. Each is a potential with forces along m.
 #include "tendril/dynamics/integrator.hpp"
 
 namespace tendril {
@@ -39,8 +40,9 @@ public:
       rule.guess.add(1, *rule.half);
     }
     if (start.strains.empty()) return rule;
-    // Along the chord from the start to the middle strains change with the square of the motion, too, of which the rate in the middle has twice as
-    // much: what is missing was, in the last step, half of the difference between the strain at its end and that as far beyond its middle.
+    // Along the chord from the start to the middle strains change with the square of the motion, too, of which the rate
+    // in the middle has twice as much: what is missing was, in the last step, half of the difference between the strain
+    // at its end and that as far beyond its middle.
     rule.damping_past = {{-0.5 * std::pow(h / start.last_dt, 2), start.strains.data()}};
     return rule;
   }
@@ -51,15 +53,18 @@ public:
     return end;
   }
 
-  /// h^3/12 x''', by the accelerations in the middles of this step and the last; of the first, in its middle and at its start.
+  /// h^3/12 x''', by the accelerations in the middles of this step and the last; of the first, in its middle and at its
+  /// start.
   Combination error(const State &start, double h, const Stages &done) const override {
     const double third = h * h * h / 12 / (0.5 * (h + start.last_dt));
     return Combination().add(third, done.back().acceleration).add(-third, start.memory[0]);
   }
 
   void finish(State &state, double, const Stages &done) const override {
-    for (std::size_t v = 0; v < state.velocity.size(); ++v) state.velocity[v] = 2 * done.back().velocity.vertex[v] - state.velocity[v];
-    for (std::size_t e = 0; e < state.twist_rate.size(); ++e) state.twist_rate[e] = 2 * done.back().velocity.edge[e] - state.twist_rate[e];
+    for (std::size_t v = 0; v < state.velocity.size(); ++v)
+      state.velocity[v] = 2 * done.back().velocity.vertex[v] - state.velocity[v];
+    for (std::size_t e = 0; e < state.twist_rate.size(); ++e)
+      state.twist_rate[e] = 2 * done.back().velocity.edge[e] - state.twist_rate[e];
     state.memory = {done.back().acceleration};
   }
 
