@@ -19,7 +19,7 @@ double distanceBetween(const State &a, const State &b) {
 
 constexpr double sharp = 1e-11; // of the load
 
-bool SharpTolerance::isMet(const IncrementalPotential::Residual &residual) {
+bool SharpTolerance::isMet(const Residual &residual) {
   constexpr double enough = 100 * sharp;
   return excess(residual, enough) <= 1 || isAtNoise(residual, enough);
 }

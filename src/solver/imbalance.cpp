@@ -9,7 +9,7 @@
 namespace tendril {
 namespace {
 
-using Residual = IncrementalPotential::Residual;
+using Residual = Residual;
 
 /// Where `value(k)` is largest; the first that is not finite counts as that.
 template <class Value> int largestOf(int count, Value value) {

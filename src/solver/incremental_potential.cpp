@@ -3,70 +3,17 @@
 #include "tendril/energy/edge.hpp"
 
 #include <algorithm>
-#include <map>
 #include <utility>
 
 namespace tendril {
-namespace {
+using C = Configuration;
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
-/// Rounding of an edge relative to its length: that of the edge itself, and that of the second word of positions.
-double edgeError(double reach, double edge) { return epsilon * (1 + epsilon * reach / edge); }
-
-/// Loads on each rod [N]: its weight, and the forces and couples on what is free to move.
-std::vector<double> loads(const Scene &scene, const std::vector<double> &length) {
-  std::vector<double> load;
-  for (std::size_t r = 0; r < scene.rods.size(); ++r) {
-    const Rod &rod = scene.rods[r];
-    double s = rod.gravity ? rod.material.linear_density * length[r] * scene.gravity.norm() : 0;
-    s += rod.material.linear_density * length[r] * length[r] * scene.rotation.angular_velocity.squaredNorm();
-    auto held = [&](int vertex) {
-      return std::any_of(scene.supports.begin(), scene.supports.end(), [&](const Support &support) {
-        return support.rod == int(r) && support.vertex == vertex && support.holdsPosition();
-      });
-    };
-    std::map<int, Vec3> force; // per vertex: forces that cancel are none
-    for (const NodalForce &f : scene.forces)
-      if (f.rod == int(r)) force.try_emplace(f.vertex, Vec3::Zero()).first->second += f.force;
-    for (const auto &[vertex, f] : force)
-      if (!held(vertex)) s += f.norm();
-    for (const EdgeMoment &c : scene.moments)
-      if (c.rod == int(r)) s += (std::abs(c.torque) + c.moment.norm()) / length[r];
-    load.push_back(s);
-  }
-  return load;
-}
-
-} // namespace
-
-using C = Configuration;
-
 IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, const Elements &elements, bool dynamic)
     : scene_(scene), dofs_(dofs), elements_(elements), retraction_(elements), axial_(scene, elements),
-      terms_(makeTerms(scene, elements, axial_, dynamic)), start_(elements.slots),
-      known_(elements.rods.size(), Known::nothing) {
-  for (std::size_t r = 0; r < elements.rods.size(); ++r) {
-    const RodRange &rod = elements.rods[r];
-    double sum = 0, shortest = HUGE_VAL, longest = 0, bending = 0, cell = HUGE_VAL;
-    for (int s = rod.first_slot; s < rod.edgeEnd(); ++s) {
-      sum += elements.restLength()[s];
-      shortest = std::min(shortest, elements.restLength()[s]);
-      longest = std::max(longest, elements.restLength()[s]);
-    }
-    for (int n = elements.rod_cells[r]; n < elements.rod_cells[r + 1]; ++n) {
-      cell = std::min(cell, elements.cellLength()[elements.cell_slot[n]]);
-      for (int k = 0; k < 3; ++k) bending += elements.cells()[cell_stiffness + k][elements.cell_slot[n]];
-    }
-    length_.push_back(sum);
-    shortest_.push_back(shortest);
-    longest_.push_back(longest);
-    bending_.push_back(bending);
-    shortest_cell_.push_back(cell);
-  }
-  load_ = loads(scene, length_);
-  force_scale_.resize(load_.size());
-}
+      terms_(makeTerms(scene, elements, axial_, dynamic)), supports_(scene, dofs, elements), start_(elements.slots),
+      known_(elements.rods.size(), Known::nothing), scales_(rodScales(scene, elements)) {}
 
 void IncrementalPotential::beginStep(const State &start, const Step &step) {
   start_time_ = start.time;
@@ -75,7 +22,7 @@ void IncrementalPotential::beginStep(const State &start, const Step &step) {
   if (iterate_.empty()) iterate_ = start_;
   if (step.rule && reference_.empty()) reference_ = start_;
   step_.twist_reference = step.rule ? &reference_ : nullptr;
-  turnSupports(start_, start_time_);
+  supports_.turn(start_, start_time_, step_.time);
   retraction_.setInverseTimeSquared(step.isStatic() ? 0 : 1 / (step.dt * step.dt));
 }
 
@@ -85,8 +32,8 @@ void IncrementalPotential::beginRod(const State &start, int r) {
   if (step_.rule) carryFrames(*step_.rule, elements_, r, start_, reference_);
   axial_.beginStep(start_, step_, r);
   for (auto &term : terms_) term->beginStep(start, start_, step_, r);
-  followSupports(r);
-  force_scale_[r] = forceScale(start, r);
+  supports_.follow(r, iterate_);
+  scales_[r].force = tendril::forceScale(scene_, elements_, step_, start, scales_[r], r);
   known_[r] = Known::nothing;
 }
 
@@ -94,89 +41,6 @@ void IncrementalPotential::setLoadFactor(double factor) {
   step_.load_factor = step_.time = factor;
   for (auto &term : terms_) term->setLoadFactor(factor);
   std::fill(known_.begin(), known_.end(), Known::nothing);
-}
-
-/// The force that measures a rod's residual: its loads. A rod without any is measured by the force that deforms it,
-/// the smallest of EI/L^2, GJ/L^2 and 1e-4 EA, or, where that is smaller, by the force that would stop it within the
-/// step.
-double IncrementalPotential::forceScale(const State &start, int r) const {
-  if (load_[r] > 0) return load_[r];
-  const Material &m = scene_.rods[r].material;
-  const RodRange &rod = elements_.rods[r];
-  double softest = 1e-4 * m.axial_stiffness * length_[r] * length_[r];
-  if (!m.isCable())
-    for (const double k : {m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness})
-      if (k > 0) softest = std::min(softest, k);
-  const double scale = softest / (length_[r] * length_[r]);
-  if (step_.isStatic()) return scale;
-  double momentum = 0;
-  for (int i = 0; i < rod.vertices; ++i)
-    momentum += elements_.mass()[rod.slot(i)] * start.velocity[rod.first_vertex + i].norm();
-  return momentum > 0 ? std::min(scale, momentum / step_.dt) : scale;
-}
-
-/// Supports' frames to the time of the step.
-void IncrementalPotential::turnSupports(const Configuration &from, double from_time) {
-  beyond_barrier_ = false;
-  turned_.clear();
-  for (std::size_t s = 0; s < scene_.supports.size(); ++s) {
-    const int slot = elements_.support_slot[s];
-    const Motion &motion = scene_.supports[s].motion;
-    if (slot < 0 || !motion.moves()) continue;
-    Turned turned{scene_.supports[s].rod, slot, 0.0, from.frameAt(slot)};
-    // In parts of less than half a radian, so that whole turns within the step are counted.
-    const int parts = 1 + int(2 * (motion.rotationVectorAt(step_.time) - motion.rotationVectorAt(from_time)).norm());
-    for (int k = 1; k <= parts; ++k) {
-      const double time = k == parts ? step_.time : from_time + (step_.time - from_time) * k / parts;
-      const Frame now = supportFrame(scene_.supports[s], time);
-      turned.angle += halfAngleBetween(turned.end, now).angle();
-      turned.end = now;
-    }
-    turned_.push_back(turned);
-  }
-}
-
-/// Turned frames of a rod's supports; whole turns of its twist angles follow.
-void IncrementalPotential::followSupports(int r) {
-  bool any = false;
-  for (const Turned &turned : turned_) {
-    if (turned.rod != r) continue;
-    iterate_.setFrame(turned.slot, turned.end);
-    any = true;
-  }
-  if (!any) return;
-  auto turning = [&](int frame) {
-    for (const Turned &turned : turned_)
-      if (turned.slot == frame) return turned.angle;
-    return 0.0;
-  };
-  forCells(elements_, r, [&]<class T>(const LooseCell &cells, int count) {
-    for (int l = 0; l < count; ++l) {
-      const LooseCell cell{cells.slot + l, cells.frame0 + l, cells.frame1 + l, cells.vertex + l};
-      double &twist = iterate_[C::twist][cell.slot], &turns = iterate_[C::turns][cell.slot];
-      const double expected = twist + turning(cell.frame1) - turning(cell.frame0);
-      const double principal = halfAngleBetween(iterate_.frameAt(cell.frame0), iterate_.frameAt(cell.frame1)).angle();
-      turns = 2 * pi * std::round((expected - principal) / (2 * pi));
-      twist = principal + turns;
-      beyond_barrier_ = beyond_barrier_ || (elements_.measure[r] == Measure::tan && turns != 0);
-    }
-  });
-}
-
-bool IncrementalPotential::remainingMotion(RodSet rods, Planes &increment) const {
-  bool any = false;
-  for (const Support &s : scene_.supports) {
-    if (s.rod < rods.begin || s.rod >= rods.end || !s.holdsPosition() || !s.motion.moves()) continue;
-    const RodRange &rod = elements_.rods[s.rod];
-    const int slot = rod.slot(s.vertex);
-    const Vec3 target = scene_.rods[s.rod].position[s.vertex] + s.motion.displacementAt(step_.time);
-    Vec3 d = (target - iterate_.positionAt(slot)) - iterate_.values().vector(C::position_low, slot);
-    if (d.norm() <= 4 * epsilon * target.norm()) d.setZero();
-    any = any || !d.isZero(0);
-    increment.setVector(0, slot, d);
-    dofs_.copyBehindRing(rod, increment);
-  }
-  return any;
 }
 
 /// Largest coordinate of a rod's vertices [m].
@@ -213,7 +77,8 @@ double IncrementalPotential::steepnessOf(const Configuration &c, int r) const {
 IncrementalPotential::RodEnergy IncrementalPotential::rodEnergy(const Configuration &c, int r) const {
   using std::abs;
   const RodRange &rod = elements_.rods[r];
-  const double reach = reachOf(c, rod), steepness = steepnessOf(c, r), blur = edgeError(reach, shortest_[r]);
+  const double reach = reachOf(c, rod), steepness = steepnessOf(c, r),
+               blur = edgeError(reach, scales_[r].shortest_edge);
   Pack stretching(0.0);
   for (int i = rod.first_slot; i < rod.edgeEnd(); i += lanes) {
     const Pack stiffness = read<Pack>(axial_.stiffness() + i);
@@ -221,7 +86,7 @@ IncrementalPotential::RodEnergy IncrementalPotential::rodEnergy(const Configurat
     stretching += (force + stiffness * Pack(blur)) * (Pack(blur) * read<Pack>(elements_.restLength() + i));
   }
   // Edge, length, tangent and binormal each round.
-  const double delta = 4 * blur, bending = bending_[r] * steepness;
+  const double delta = 4 * blur, bending = scales_[r].bending * steepness;
   RodEnergy result{0, reduce(stretching), 0, reach, steepness};
   for (const auto &term : terms_) {
     const double energy = term->energy(c, r);
@@ -363,7 +228,7 @@ void IncrementalPotential::coordinates(Planes &x, RodSet rods) const {
   }
 }
 
-void IncrementalPotential::moveTo(const Planes &x, RodSet rods, bool supports) {
+bool IncrementalPotential::moveTo(const Planes &x, RodSet rods, bool supports) {
   Planes now = dofs_.makePlanes(), increment = now;
   if (supports) remainingMotion(rods, increment);
   coordinates(now, rods);
@@ -377,88 +242,17 @@ void IncrementalPotential::moveTo(const Planes &x, RodSet rods, bool supports) {
         moves = moves || increment[a][s] != 0;
       }
     dofs_.copyBehindRing(rod, increment);
-    if (moves && tryMove(increment, 1.0, r, RetractionKind::additive, trial)) accept(trial, r);
+    if (!moves) continue;
+    if (!tryMove(increment, 1.0, r, RetractionKind::additive, trial)) return false;
+    accept(trial, r);
   }
+  return true;
 }
 
-IncrementalPotential::Residual IncrementalPotential::residual(int r, const RodEnergy &energy) {
-  using std::abs;
-  const RodRange &rod = elements_.rods[r];
-  const Material &m = scene_.rods[r].material;
-  const Planes &out_of_balance = gradient(r).equilibrium;
-  Pack forces(0.0), moments(0.0), tension(0.0), error(0.0);
-  for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) {
-    forces += read<Pack>(elements_.freedom() + s) * readVector<Pack>(out_of_balance, 0, s).squaredNorm();
-    const Pack g = read<Pack>(out_of_balance[3] + s);
-    moments += g * g;
-  }
-  for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
-    const Pack::mask_type live = firstLanes(rod.edgeEnd() - s);
-    const Pack force = read<Pack>(iterate_[C::axial_force] + s),
-               strain = read<Pack>(iterate_[C::strain] + s) - read<Pack>(axial_.rest() + s);
-    tension = max(tension, select(live, Pack(abs(force)), Pack(0.0)));
-    error = max(error, select(live, Pack(abs(strain - force / read<Pack>(axial_.stiffness() + s))), Pack(0.0)));
-  }
-  const double force = reduce(forces), moment = reduce(moments);
-  // Edges carry errors of epsilon in their strains and directions, which the stiffnesses turn into forces and moments.
-  const double strain_noise = edgeError(energy.reach, shortest_[r]), count = std::sqrt(double(rod.vertices));
-  const double bending = energy.steepness *
-                         std::max({m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness}) /
-                         shortest_[r];
-  const double scale = force_scale_[r], stretching = step_.mixed ? hmax(tension) : hmax(tension) + m.axial_stiffness;
-  Residual result;
-  result.force = std::sqrt(force) / scale;
-  result.moment = std::sqrt(moment) / (scale * length_[r]);
-  result.compatibility = step_.mixed ? hmax(error) : 0;
-  // Inertia turns an error of position or twist into a force or a moment, which counts in short steps.
-  const double inertia = step_.isStatic() ? 0 : longest_[r] / (step_.dt * step_.dt),
-               heavy = m.linear_density * shortest_[r] * inertia, spinning = m.linear_rotational_inertia * inertia;
-  result.force_floor =
-      4 * count * strain_noise * (stretching + heavy + (m.isCable() ? 0 : bending / shortest_[r])) / scale;
-  if (!m.isCable()) result.moment_floor = 4 * count * strain_noise * (bending + spinning) / (scale * length_[r]);
-  result.compatibility_floor = 16 * strain_noise;
-  return result;
-}
-
-void IncrementalPotential::Residual::include(const Residual &other) {
-  for (double Residual::*part : {&Residual::force, &Residual::moment, &Residual::compatibility, &Residual::force_floor,
-                                 &Residual::moment_floor, &Residual::compatibility_floor})
-    if (other.*part > this->*part || std::isnan(other.*part)) this->*part = other.*part;
-}
-
-IncrementalPotential::Residual IncrementalPotential::residual() {
+Residual IncrementalPotential::residual() {
   Residual worst;
   for (int r = 0; r < all().end; ++r) worst.include(residual(r, rodEnergy(iterate_, r)));
   return worst;
-}
-
-[[gnu::flatten]] StageRates IncrementalPotential::stageRates(const StageRule &rule) const {
-  StageRates rates;
-  for (Rates *part : {&rates.displacement, &rates.velocity, &rates.acceleration}) {
-    part->vertex.resize(elements_.vertices());
-    part->edge.resize(elements_.edges());
-  }
-  const double rate = 1 / step_.dt;
-  for (const RodRange &rod : elements_.rods) {
-    for (int i = 0; i < rod.vertices; ++i) {
-      const int v = rod.first_vertex + i;
-      const Vec3 d = iterate_.displacementAt(rod.slot(i), start_), velocity = d * rate + rule.velocity.atVertex(v);
-      rates.displacement.vertex[v] = d;
-      rates.velocity.vertex[v] = velocity;
-      rates.acceleration.vertex[v] = (rule.mass * velocity + rule.acceleration.atVertex(v)) * rate;
-    }
-    for (int i = 0; i < rod.edges; i += lanes) {
-      const Pack spun = spinOver(twistReference(), iterate_, rod.slot(i));
-      for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) {
-        const int e = rod.first_edge + i + l;
-        const double d = spun[l], velocity = d * rate + rule.velocity.atEdge(e);
-        rates.displacement.edge[e] = d;
-        rates.velocity.edge[e] = velocity;
-        rates.acceleration.edge[e] = (rule.mass * velocity + rule.acceleration.atEdge(e)) * rate;
-      }
-    }
-  }
-  return rates;
 }
 
 std::array<Vec3, 2> IncrementalPotential::supportAction(const State &start, int s) {
@@ -494,7 +288,7 @@ bool IncrementalPotential::moveOn(double time, const StageRule &end) {
   Configuration trial;
   const double middle = step_.time;
   step_.time = time;
-  turnSupports(iterate_, middle);
+  supports_.turn(iterate_, middle, step_.time);
   for (int r = 0; r < all().end; ++r) {
     const RodRange &rod = elements_.rods[r];
     for (int i = 0; i < rod.vertices; ++i)
@@ -509,7 +303,7 @@ bool IncrementalPotential::moveOn(double time, const StageRule &end) {
   }
   remainingMotion(all(), increment);
   for (int r = 0; r < all().end; ++r) {
-    followSupports(r);
+    supports_.follow(r, iterate_);
     if (!tryMove(increment, 1, r, RetractionKind::additive, trial)) return false;
     accept(trial, r);
     const RodRange &rod = elements_.rods[r];
@@ -528,53 +322,7 @@ bool IncrementalPotential::moveOn(double time, const StageRule &end) {
     for (int s = rod.first_slot; s < rod.edgeEnd(); ++s)
       iterate_[C::axial_force][s] = elements_.axialStiffness()[s] * iterate_[C::strain][s];
   }
-  return !beyond_barrier_;
-}
-
-void IncrementalPotential::commit(State &state, RodSet rods) const {
-  for (int r = rods.begin; r < rods.end && !step_.isStatic(); ++r) {
-    const RodRange &rod = elements_.rods[r];
-    const double rate = 1 / step_.dt;
-    for (int a = 0; a < 3; ++a) { // plane by plane
-      const double *now = iterate_[C::Plane(C::position + a)] + rod.first_slot,
-                   *before = start_[C::Plane(C::position + a)] + rod.first_slot;
-      const double *low = iterate_[C::Plane(C::position_low + a)] + rod.first_slot,
-                   *low_before = start_[C::Plane(C::position_low + a)] + rod.first_slot;
-      for (int i = 0; i < rod.vertices; ++i)
-        state.velocity[rod.first_vertex + i][a] = ((now[i] - before[i]) + (low[i] - low_before[i])) * rate;
-    }
-    for (int i = 0; i < rod.edges; i += lanes) {
-      const Pack spun = spinOver(start_, iterate_, rod.slot(i)) * Pack(rate);
-      for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) state.twist_rate[rod.first_edge + i + l] = spun[l];
-    }
-  }
-  commitConfiguration(state, rods);
-}
-
-[[gnu::flatten]] void IncrementalPotential::commitConfiguration(State &state, RodSet rods) const {
-  for (int r = rods.begin; r < rods.end; ++r) {
-    const RodRange &rod = elements_.rods[r];
-    for (int n = elements_.rod_cells[r]; n < elements_.rod_cells[r + 1]; ++n)
-      state.turns[n] = iterate_[C::turns][elements_.cell_slot[n]];
-    for (int a = 0; a < 3; ++a) { // plane by plane
-      const double *high = iterate_[C::Plane(C::position + a)] + rod.first_slot,
-                   *low = iterate_[C::Plane(C::position_low + a)] + rod.first_slot;
-      for (int i = 0; i < rod.vertices; ++i) {
-        state.position[rod.first_vertex + i][a] = high[i];
-        state.position_low[rod.first_vertex + i][a] = low[i];
-      }
-    }
-    for (int i = 0; i < rod.edges; i += lanes) {
-      const int slot = rod.slot(i), live = std::min(lanes, rod.edges - i);
-      const FrameOf<Pack> f = iterate_.frames<Pack>(slot);
-      const Vector3<Pack> d = orthonormalised<Pack>(f.director, f.tangent);
-      for (int l = 0; l < live; ++l) {
-        const int e = rod.first_edge + i + l;
-        state.director[e] = Vec3(d[0][l], d[1][l], d[2][l]);
-        state.axial_force[e] = iterate_[C::axial_force][slot + l];
-      }
-    }
-  }
+  return !supports_.beyondBarrier();
 }
 
 } // namespace tendril

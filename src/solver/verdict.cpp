@@ -18,11 +18,11 @@ constexpr int patience = 3; ///< iterations without a fall of the residual
 
 } // namespace
 
-double excess(const IncrementalPotential::Residual &r, double rtol) {
+double excess(const Residual &r, double rtol) {
   return std::max({r.force, r.moment, r.compatibility / compatibility_rtol}) / rtol;
 }
 
-bool isAtNoise(const IncrementalPotential::Residual &r, double rtol) {
+bool isAtNoise(const Residual &r, double rtol) {
   return r.force <= std::max(rtol, r.force_floor) && r.moment <= std::max(rtol, r.moment_floor) &&
          r.compatibility <= std::max(compatibility_rtol * rtol, r.compatibility_floor);
 }
@@ -138,7 +138,7 @@ NewtonSolver::Verdict NewtonSolver::judge(int r, double rtol) {
 /// Whether the residual of a rod is below the tolerance, or at a noise that is little against the loads: what is asked
 /// of motions that corrections leave out.
 bool NewtonSolver::isBalanced(int r, double rtol) const {
-  const IncrementalPotential::Residual &residual = work_->residual[r];
+  const Residual &residual = work_->residual[r];
   return excess(residual, rtol) <= 1 ||
          (isAtNoise(residual, rtol) &&
           std::max(residual.force_floor, residual.moment_floor) <= potential_->settings.rounding_tolerance);

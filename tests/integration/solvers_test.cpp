@@ -51,6 +51,32 @@ TEST(LinearSolvers, GiveTheSameRun) {
   }
 }
 
+/// Directions come before line searches: those of PETSc go along them, too, where supports move and couples act.
+TEST(LineSearches, OfPetscComeToTheSameAnswer) {
+  Scene both = chainAndRing(), bar = both;
+  both.supports[0].motion.velocity = Vec3(0, 0.1, 0);
+  both.supports[0].motion.angular_velocity = Vec3(0, 0, 1);
+  both.moments = {{0, 19, 0, Vec3(0, 0, 1e-4)}};
+  bar.rods.pop_back();
+  bar.supports.pop_back();
+  bar.supports[0].motion = both.supports[0].motion;
+  const OptionSet sharp("-snes_rtol", "1e-9");
+  for (const auto &[scene, settings] : {std::pair(both, dynamics(0.01, 0.05)), std::pair(bar, statics(10))}) {
+    auto run = [&, &scene = scene, &settings = settings] {
+      Simulation sim;
+      runTo(sim, scene, settings);
+      return sim.state;
+    };
+    const State ours = run();
+    for (const char *type : {"basic", "l2", "cp"}) {
+      const OptionSet option("-snes_linesearch_type", type);
+      const State other = run();
+      for (std::size_t v = 0; v < ours.position.size(); ++v)
+        EXPECT_LT((other.position[v] - ours.position[v]).norm(), 1e-6) << type << ", vertex " << v; // of -snes_rtol
+    }
+  }
+}
+
 /// Linear and nonlinear iterations of a run.
 std::pair<int, int> iterationsWith(Scene scene, const LoopSettings &settings,
                                    std::initializer_list<std::pair<const char *, const char *>> options) {

@@ -57,7 +57,7 @@ public:
   SharpTolerance(const SharpTolerance &) = delete;
   /// Whether an answer is one by its forces: beside a limit point, where there is none, Newton's corrections may be
   /// little, too.
-  static bool isMet(const IncrementalPotential::Residual &residual);
+  static bool isMet(const Residual &residual);
 
 private:
   StepSolver &solver_;

@@ -4,26 +4,9 @@
 
 #include "tendril/dynamics/simulation.hpp"
 #include "tendril/io/hdf5.hpp"
+#include "tendril/io/run_facts.hpp"
 
 namespace tendril {
-
-/// A run by what a restart compares: what is other is told, and another topology is refused.
-struct RunFacts {
-  enum class Kind { option, load, scene, start };
-  struct Fact {
-    Kind kind;
-    std::string name, value; ///< a value that begins with # stands for something long, by its hash
-  };
-  bool dynamic = true;
-  std::string integrator;
-  double dt = 0;           ///< as asked for [s, or load factor]
-  std::vector<Fact> facts; ///< options, loads, supports, materials, laws and shapes
-  std::string topology_hash,
-      scene_hash; ///< of vertices, edges and closedness of all rods; of the text of the scene and its files
-
-  /// \param text of the scene and the files it names
-  RunFacts(const Scene &scene, const LoopSettings &settings, const std::string &text = "");
-};
 
 /// A checkpoint of which not all is there, or not as it was written.
 struct DamagedCheckpoint : SceneError {

@@ -5,9 +5,14 @@
 #include "tendril/accuracy/accuracy.hpp"
 #include "tendril/io/trajectory.hpp"
 
+#include <array>
 #include <set>
+#include <string_view>
 
 namespace tendril {
+
+/// Words of -bifurcation, in the order of Bifurcation.
+inline constexpr std::array<std::string_view, 4> bifurcations{"off", "locate", "stop", "switch"};
 
 /// What is in force in a run: the command line over the scene's `simulation` block.
 struct Options {

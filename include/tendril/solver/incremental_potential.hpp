@@ -3,8 +3,10 @@
 /// The function one implicit step minimises, on the configuration manifold: the terms of the scene, the iterate, and
 /// the moves between iterates. Rods that nothing joins are independent of each other: everything is done rod by rod.
 
-#include "tendril/energy/term.hpp"
+#include "tendril/solver/residual.hpp"
+#include "tendril/state/commit.hpp"
 #include "tendril/state/retraction.hpp"
+#include "tendril/state/support_motion.hpp"
 
 #include <limits>
 
@@ -37,7 +39,7 @@ public:
   void beginRod(const State &start, int rod);
   /// Whether a support has turned its edge past 180 degrees of twist in one step, where the measure `tan` has its
   /// barrier.
-  bool beyondBarrier() const { return beyond_barrier_; }
+  bool beyondBarrier() const { return supports_.beyondBarrier(); }
   /// Changes the load factor (in statics also the time) of the step under way; the iterate stays.
   void setLoadFactor(double factor);
   const Configuration &iterate() const { return iterate_; }
@@ -50,7 +52,9 @@ public:
 
   /// Increments that held vertices of some rods still have to make to reach their prescribed positions; zero elsewhere.
   /// True when there are any.
-  bool remainingMotion(RodSet rods, Planes &increment) const;
+  bool remainingMotion(RodSet rods, Planes &increment) const {
+    return supports_.remaining(iterate_, step_.time, rods, increment);
+  }
 
   /// Energy of a rod [J]; +inf where the configuration is impossible. Rounding blurs it by `noise`: differences below
   /// decide nothing [J].
@@ -96,38 +100,36 @@ public:
 
   /// Moves to where the unknowns are `x` (displacements and spins since the step began) by the additive retraction.
   /// \param supports whether supports that move go to the end of their motion, too
-  void moveTo(const Planes &x, RodSet rods, bool supports = false);
+  /// \return whether the configuration there is possible; where it is not, some rods may have moved
+  [[nodiscard]] bool moveTo(const Planes &x, RodSet rods, bool supports = false);
   /// Displacements and spins of the iterate since the step began.
   void coordinates(Planes &x, RodSet rods) const;
   void coordinates(Planes &x) const { coordinates(x, all()); }
 
-  /// Residual relative to the load scale, and the strain error of the axial forces.
-  struct Residual {
-    double force = 0, moment = 0;                                      ///< 1 is the rod's load scale
-    double compatibility = 0;                                          ///< largest |strain - S/k|
-    double force_floor = 0, moment_floor = 0, compatibility_floor = 0; ///< what rounding leaves, same units
-    void include(const Residual &other); ///< the larger of each; not a number is the largest
-    bool isFinite() const { return std::isfinite(force) && std::isfinite(moment); }
-  };
   /// \param energy that of the iterate
-  Residual residual(int rod, const RodEnergy &energy);
+  Residual residual(int rod, const RodEnergy &energy) {
+    return residualOf(elements_, scene_.rods[rod].material, step_, axial_, iterate_, gradient(rod).equilibrium,
+                      scales_[rod], energy.reach, energy.steepness, elements_.rods[rod]);
+  }
   /// The largest of each over all rods.
   Residual residual();
   /// What forces of a rod are measured by [N], and moments by that times its length: its loads, or where it `hasLoad`
   /// not, what deforms it.
-  double forceScale(int rod) const { return force_scale_[rod]; }
-  bool hasLoad(int rod) const { return load_[rod] > 0; }
+  double forceScale(int rod) const { return scales_[rod].force; }
+  bool hasLoad(int rod) const { return scales_[rod].load > 0; }
   const AxialLaw &axial() const { return axial_; }
 
   /// Displacements of the iterate since the step began, and the rates that follow from them by a rule.
-  StageRates stageRates(const StageRule &rule) const;
+  StageRates stageRates(const StageRule &rule) const {
+    return tendril::stageRates(elements_, start_, twistReference(), iterate_, step_.dt, rule);
+  }
   /// Force [N] and moment [N m] of a support on its rod at the iterate, without the inertia of the held vertex itself.
   /// \param start of the step
   std::array<Vec3, 2> supportAction(const State &start, int support);
   const Configuration &start() const { return start_; }
-  double length(int rod) const { return length_[rod]; }         ///< at rest [m]
-  double shortestEdge(int rod) const { return shortest_[rod]; } ///< at rest [m]
-  double longestEdge(int rod) const { return longest_[rod]; }   ///< at rest [m]
+  double length(int rod) const { return scales_[rod].length; }              ///< at rest [m]
+  double shortestEdge(int rod) const { return scales_[rod].shortest_edge; } ///< at rest [m]
+  double longestEdge(int rod) const { return scales_[rod].longest_edge; }   ///< at rest [m]
   /// From the last stage of a step to its end at `time`: positions, spins and directors to where the guess of a rule
   /// leads (supports to their places), axial forces come from the strains. False when that leads to an impossible
   /// configuration.
@@ -135,8 +137,13 @@ public:
 
   /// State of some rods after the step: positions, directors made orthonormal, axial forces; and the velocities of
   /// backward Euler.
-  void commitConfiguration(State &state, RodSet rods) const;
-  void commit(State &state, RodSet rods) const;
+  void commitConfiguration(State &state, RodSet rods) const {
+    tendril::commitConfiguration(elements_, iterate_, rods, state);
+  }
+  void commit(State &state, RodSet rods) const {
+    if (!step_.isStatic()) commitChords(elements_, start_, iterate_, step_.dt, rods, state);
+    commitConfiguration(state, rods);
+  }
   /// Of all, with the time.
   void commitConfiguration(State &state) const {
     commitConfiguration(state, all());
@@ -156,12 +163,7 @@ private:
   std::vector<std::unique_ptr<Term>> terms_;
   Step step_;
   double start_time_ = 0;
-  struct Turned {
-    int rod, slot;
-    double angle; ///< [rad]
-    Frame end;
-  };
-  std::vector<Turned> turned_; ///< supports' frames that turn in this step
+  SupportMotion supports_;
   Configuration start_, iterate_;
   Configuration reference_; ///< frames from which stages measure twist
   const Configuration &twistReference() const { return step_.twist_reference ? *step_.twist_reference : start_; }
@@ -170,10 +172,7 @@ private:
   int room_ = 0; ///< slots
   enum class Known : char { nothing, gradient, all };
   std::vector<Known> known_; ///< per rod: what derivatives_ holds of the iterate
-  std::vector<double> load_, force_scale_, length_, shortest_,
-      longest_; ///< per rod: loads [N], or 0; the present scale of forces [N]; lengths [m]
-  std::vector<double> bending_, shortest_cell_; ///< per rod: sum of the cells' stiffnesses [N m]; [m]
-  bool beyond_barrier_ = false;
+  std::vector<RodScale> scales_;
 
   void commitTime(State &state) const {
     state.time = step_.time;
@@ -181,9 +180,6 @@ private:
   }
   double reachOf(const Configuration &configuration, const RodRange &rod) const;
   double steepnessOf(const Configuration &configuration, int rod) const;
-  void turnSupports(const Configuration &from, double from_time);
-  void followSupports(int rod);
-  double forceScale(const State &start, int rod) const;
 };
 
 } // namespace tendril

@@ -7,6 +7,7 @@
 #include "tendril/solver/circulatory.hpp"
 #include "tendril/solver/imbalance.hpp"
 #include "tendril/solver/incremental_potential.hpp"
+#include "tendril/solver/secants.hpp"
 
 #include <optional>
 #include <string>
@@ -24,13 +25,15 @@ struct NewtonReport {
   int zero_pivots = 0;              ///< motions that cost no energy
   int first_negative_pivots = 0;    ///< at the equilibrium found first, before any escape (statics)
   int escapes = 0;                  ///< saddles left along a direction of negative curvature (statics)
-  IncrementalPotential::Residual residual;
+  Residual residual;
   /// Where rounding kept Newton from its tolerance, and in statics always: what is left to the answer, over rod lengths
   /// (root mean square), of the worst rod.
   double rounding_error = 0;
   bool lost = false;           ///< in rounding: the failure of the step
   std::vector<double> history; ///< force residual, relative to the load scale, at every iterate
   std::string reason;          ///< in words
+  /// Whether Newton may have come to an unstable equilibrium, or passed it and only met indefinite Hessians.
+  bool mayPassCritical() const { return first_negative_pivots > 0 || shifts > 0; }
   /// Adds the report of another block of rods.
   void include(const NewtonReport &block);
   /// Counts what an earlier try at the same step took.
@@ -38,10 +41,10 @@ struct NewtonReport {
 };
 
 /// The largest of the residuals, in units of what it should fall to: `rtol` of its scale.
-double excess(const IncrementalPotential::Residual &residual, double rtol);
+double excess(const Residual &residual, double rtol);
 /// Whether all residuals that are too large are at the level that rounding leaves, by an estimate. That says nothing
 /// about the answer: it is no verdict.
-bool isAtNoise(const IncrementalPotential::Residual &residual, double rtol);
+bool isAtNoise(const Residual &residual, double rtol);
 
 /// Which equilibria are answers in statics: minima, or any, reached by Newton's own full steps, for following a branch.
 enum class Seek { minimum, equilibrium };
@@ -83,7 +86,7 @@ struct NewtonWork {
   std::vector<char> indefinite;    ///< rods whose Hessian gives no way down as it is
   std::vector<IncrementalPotential::RodEnergy> energy; ///< at the iterate, ...
   std::vector<char> energy_known;                      ///< ... where it has been computed
-  std::vector<IncrementalPotential::Residual> residual;
+  std::vector<Residual> residual;
   std::vector<char> moving; ///< rods whose supports have not reached their places
   std::vector<Standstill> standstill;
   std::vector<double>
@@ -125,6 +128,7 @@ public:
   // What SNES calls.
   PetscErrorCode evaluate(Vec x, Vec f);
   PetscErrorCode assemble(Mat jacobian);
+  PetscErrorCode direct(Vec x, Vec f, Vec y);
   PetscErrorCode lineSearch(SNESLineSearch search);
   PetscErrorCode testConvergence(PetscInt iteration, SNESConvergedReason *reason);
 
@@ -147,21 +151,16 @@ private:
   bool follows_ = false;            ///< whether the solve is for an equilibrium of any kind
   int patience_ = 0, spent_ = 0;    ///< iterations that the solve may take, 0: no bound; and those before SNES began
   double sharpness_ = 1, rtol_ = 0; ///< of -snes_rtol, and what is asked for now
-  /// A step and what it changed of the gradient, by unknowns; per rod one over their product, 0 where that is not
-  /// positive (BFGS).
-  struct Secant {
-    std::vector<double> step, change, inverse;
-  };
-  std::vector<Secant> secants_; ///< since the Hessian was factored
-  std::vector<double> lengths_; ///< of the last step, per rod
-  int age_ = 0;                 ///< iterations that the factorisation has served
+  Secants secants_;                 ///< since the Hessian was factored
+  std::vector<double> lengths_;     ///< of the last step, per rod
+  int age_ = 0;                     ///< iterations that the factorisation has served
   bool fresh_ = true, renew_ = false;
   double likely_ = 0;   ///< residual from which the next iterate is likely an answer
   std::string lost_;    ///< why the last solve was lost in rounding
   bool creeps_ = false; ///< whether the last solve ended for creeping towards a saddle
 
   PetscErrorCode newton(std::string *failure);
-  PetscErrorCode moveTo(Vec x);
+  PetscErrorCode moveTo(Vec x, bool *possible);
   PetscErrorCode writeIterate(Vec x);
   KSP factored() const;
   PetscErrorCode readInertia(bool *regular);
@@ -174,11 +173,10 @@ private:
   double firstShift(int rod) const;
   PetscErrorCode includeMotion(Vec y);
   PetscErrorCode includeCirculation(bool *regular);
+  PetscErrorCode keepGradient(Vec f, std::vector<double> *values);
   bool searchRod(int rod, double *lambda);
   bool residualFalls(int rod, double length, const IncrementalPotential::RodEnergy &trial);
   bool sharesFactor() const;
-  PetscErrorCode secantDirection(Vec f, Vec y);
-  PetscErrorCode addSecant(const std::vector<double> &before, Vec f);
   enum class Verdict { going, answer, lost, saddle };
   Verdict judge(int rod, double rtol);
   double sizeOf(int rod, const Planes &increment) const;
@@ -207,9 +205,6 @@ private:
   template <class Value, class Same> void fill(std::vector<Value> &values, Same value) {
     std::fill(values.begin() + rods_.begin, values.begin() + rods_.end, value);
   }
-  std::string nearBarrier() const;
-  std::string sharpestBend(const Configuration &c, double sharpest, double longest) const;
-  std::string limitOfLaw(const Configuration &c, double sharpest, double longest, double shortest) const;
 };
 
 /// Registers the line search type `retraction` and the factorisation `banded`; call after PetscInitialize.

@@ -1,0 +1,38 @@
+#pragma once
+/// \file support_motion.hpp
+/// Prescribed motion of supports within a step: their frames go to its end at once, the vertices that they hold with
+/// the iterations.
+
+#include "tendril/state/state.hpp"
+
+namespace tendril {
+
+class SupportMotion {
+public:
+  SupportMotion(const Scene &scene, const DofMap &dofs, const Elements &elements)
+      : scene_(scene), dofs_(dofs), elements_(elements) {}
+
+  /// Takes up how the frames of all supports turn from where they are in a configuration. Whole turns count.
+  void turn(const Configuration &from, double from_time, double to_time);
+  /// Turned frames of a rod's supports; whole turns of its twist angles follow.
+  void follow(int rod, Configuration &iterate);
+  /// Whether a support has turned its edge past 180 degrees of twist, where the measure `tan` has its barrier.
+  bool beyondBarrier() const { return beyond_barrier_; }
+  /// Increments that held vertices of some rods still have to make to their places at a time; zero elsewhere. True when
+  /// there are any.
+  bool remaining(const Configuration &iterate, double time, RodSet rods, Planes &increment) const;
+
+private:
+  const Scene &scene_;
+  const DofMap &dofs_;
+  const Elements &elements_;
+  struct Turned {
+    int rod, slot;
+    double angle; ///< [rad]
+    Frame end;
+  };
+  std::vector<Turned> turned_; ///< frames that turn in this step
+  bool beyond_barrier_ = false;
+};
+
+} // namespace tendril

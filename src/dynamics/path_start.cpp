@@ -1,0 +1,179 @@
+/// Where a path begins, and the critical points on it.
+#include "tendril/dynamics/arc_length.hpp"
+
+#include "tendril/solver/activity.hpp"
+
+#include <algorithm>
+
+namespace tendril {
+
+/// Equilibrium at the load factor the run begins with: rods need not be at rest as drawn.
+PetscErrorCode ArcLength::findStart(State &state) {
+  PetscFunctionBeginUser;
+  Step step;
+  step.time = step.load_factor = state.time;
+  step.mixed = settings_.mixed;
+  NewtonReport report;
+  PetscCall(solver_.solve(state, step, &report));
+  if (!report.converged) {
+    std::ostringstream message;
+    message << "no equilibrium at load factor " << state.time << " to start the path from: " << report.reason
+            << "; draw the rods nearer to their shape without load, or use -continuation load";
+    failure_ = message.str();
+    PetscFunctionReturn(0);
+  }
+  const std::int64_t number = state.step;
+  solver_.potential().commit(state);
+  state.step = number;
+  PetscFunctionReturn(0);
+}
+
+/// Makes a state the start of a step, and the tangent of the path there.
+PetscErrorCode ArcLength::begin(const State &state, Point *direction) {
+  PetscFunctionBeginUser;
+  Step step;
+  step.time = step.load_factor = state.time;
+  step.mixed = settings_.mixed;
+  solver_.begin(state, step);
+  PetscCall(tangent(direction));
+  PetscFunctionReturn(0);
+}
+
+/// Motions at the iterate that cost next to nothing: of stiffness below `little` of the softest bending, of either
+/// sign.
+PetscErrorCode ArcLength::countNeutral(double little, int *count) {
+  PetscFunctionBeginUser;
+  int low, high;
+  PetscCall(solver_.inertiaAtIterate(&low, -little));
+  PetscCall(solver_.inertiaAtIterate(&high, little));
+  *count = low - high;
+  PetscFunctionReturn(0);
+}
+
+/// Where a motion costs nothing, solves the start of a step and its tangent again, and what follows, to a sharper
+/// tolerance: a turn about an axis that costs nothing in equilibrium has a stiffness of the residual, which may be
+/// larger than what holds it and of the other sign. Then steps go along it.
+PetscErrorCode ArcLength::refine(State &state, Point *direction, bool *refined) {
+  constexpr double little = 1e-4; // of the softest bending
+  PetscFunctionBeginUser;
+  PetscCall(begin(state, direction));
+  if (negative_ < 0) PetscFunctionReturn(0);
+  int neutral;
+  PetscCall(countNeutral(little, &neutral));
+  if (neutral <= 0) PetscFunctionReturn(0);
+  sharpness_ = 1e-2;
+  PetscCall(correct(state.time, *direction, 0, refined));
+  if (!*refined) PetscFunctionReturn(0);
+  const std::int64_t number = state.step;
+  solver_.potential().commit(state);
+  state.step = number;
+  PetscCall(tangent(direction));
+  PetscFunctionReturn(0);
+}
+
+/// Says so where the loads move what costs nothing at the start of the path: a rod that hangs from one pin has no
+/// position without them.
+PetscErrorCode ArcLength::refuseFreeStart(const State &state) {
+  constexpr double little = 1e-5; // of the softest bending
+  PetscFunctionBeginUser;
+  Point direction;
+  PetscCall(begin(state, &direction));
+  int neutral;
+  PetscCall(countNeutral(little, &neutral));
+  if (neutral <= 0) PetscFunctionReturn(0);
+  std::ostringstream message;
+  message << "the path cannot start at load factor " << state.time
+          << ": without loads a rod is free to move, as one that hangs from one pin is; hold it by a "
+             "clamp or a second pin, or use -continuation load";
+  failure_ = message.str();
+  PetscFunctionReturn(0);
+}
+
+/// The point between the ends of a step where the load factor turns: false position (Illinois) on the slope of the load
+/// factor along the path, by steps of other lengths from the same start.
+PetscErrorCode ArcLength::locateLimit(const State &start, const Point &before, const std::array<double, 2> &slopes,
+                                      double length, std::vector<CriticalPoint> *located) {
+  constexpr int most_steps = 20;
+  constexpr double flat = 1e-4; // of the slope at the start: the load factor is off by its square
+  PetscFunctionBeginUser;
+  const Point after = std::exchange(last_, before);
+  const int iterations = iterations_, negative = negative_;
+  const Doing here([](std::ostream &out) { out << "a limit point is searched for"; });
+  const SharpTolerance sharp(solver_);
+  std::array<double, 2> ends{0, length}, values = slopes;
+  CriticalPoint point;
+  point.limit = true;
+  for (int k = 0, kept = -1; k < most_steps; ++k) {
+    const double middle = (ends[0] * values[1] - ends[1] * values[0]) / (values[1] - values[0]);
+    last_ = before;
+    bool converged;
+    PetscCall(step(start, middle, &converged));
+    if (!converged) break;
+    Point direction;
+    PetscCall(tangent(&direction));
+    State state = start;
+    solver_.potential().commit(state);
+    state.step = start.step;
+    point.load_factor = state.time;
+    point.state = state;
+    if (std::abs(direction.factor) < flat * std::abs(slopes[0])) break;
+    const int side = direction.factor * values[0] > 0 ? 0 : 1;
+    ends[side] = middle;
+    values[side] = direction.factor;
+    if (kept == side) values[1 - side] *= 0.5;
+    kept = side;
+  }
+  last_ = after;
+  iterations_ = iterations;
+  negative_ = negative;
+  if (point.state) located->push_back(std::move(point));
+  PetscFunctionReturn(0);
+}
+
+/// The points between the ends of a step where the count of unstable motions changes while the load factor does not
+/// turn.
+PetscErrorCode ArcLength::locateBifurcation(const State &start, const State &end, const Point &before, double length,
+                                            std::vector<CriticalPoint> *located) {
+  constexpr double no_load = 1e-4; // of the step
+  PetscFunctionBeginUser;
+  const Point after = std::exchange(last_, before);
+  const int iterations = iterations_, negative = negative_;
+  const SharpTolerance sharp(solver_);
+  auto follow = [&](const BranchPoint &, double end, BranchPoint *to) -> PetscErrorCode {
+    PetscFunctionBeginUser;
+    last_ = before;
+    to->parameter = end;
+    to->state = start;
+    PetscCall(step(start, end, &to->found));
+    if (!to->found) PetscFunctionReturn(0);
+    PetscCall(countUnstable(solver_, &to->unstable));
+    solver_.potential().commit(to->state);
+    to->found = to->unstable >= 0;
+    PetscFunctionReturn(0);
+  };
+  BranchPoint low;
+  low.state = start;
+  Point direction;
+  PetscCall(begin(start, &direction));
+  PetscCall(countUnstable(solver_, &low.unstable));
+  Step settings;
+  settings.mixed = settings_.mixed;
+  for (bool found = low.unstable >= 0; found;) {
+    CriticalPoint point;
+    PetscCall(locateCritical(solver_, settings, follow, low, length, length, &point, &found));
+    if (!found) break;
+    found = point.beyond.found;
+    low = point.beyond;
+    point.state->step = start.step;
+    point.limit = false;
+    // Where the load passes zero, what may turn about an axis costs nothing and becomes unstable, or stable: that is no
+    // critical load.
+    if (std::abs(point.load_factor) >= no_load * std::abs(start.time - end.time)) located->push_back(std::move(point));
+  }
+  last_ = after;
+  iterations_ = iterations;
+  negative_ = negative;
+  PetscFunctionReturn(0);
+}
+
+} // namespace tendril

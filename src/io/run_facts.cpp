@@ -1,0 +1,186 @@
+#include "tendril/io/run_facts.hpp"
+
+#include "tendril/io/digest.hpp"
+#include "tendril/io/text.hpp"
+
+#include <charconv>
+
+namespace tendril {
+namespace {
+
+std::string hashOf(const std::string &text) {
+  Digest d;
+  d.add(text);
+  return d.hex();
+}
+
+/// As many digits as bring the number back.
+std::string textOf(double x) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, x).ptr};
+}
+std::string textOf(const Vec3 &x) { return "[" + textOf(x[0]) + ", " + textOf(x[1]) + ", " + textOf(x[2]) + "]"; }
+
+std::string textOf(const Material &m) {
+  return "linear_density " + textOf(m.linear_density) + ", linear_rotational_inertia " +
+         textOf(m.linear_rotational_inertia) + ", axial_stiffness " + textOf(m.axial_stiffness) +
+         ", torsional_stiffness " + textOf(m.torsional_stiffness) + ", flexural_stiffness [" +
+         textOf(m.flexural_stiffness[0]) + ", " + textOf(m.flexural_stiffness[1]) + "], damping " +
+         textOf(m.mass_damping_coefficient) + " and " + textOf(m.stiffness_damping_coefficient);
+}
+
+std::string textOf(const Support &support) {
+  std::string text = nameOf(support.kind);
+  if (support.holdsTwist())
+    text += " of tangent " + textOf(support.frame.tangent) + " and director " + textOf(support.frame.director);
+  const Motion &m = support.motion;
+  if (m.table.empty())
+    return m.moves() ? text + ", velocity " + textOf(m.velocity) + ", angular velocity " + textOf(m.angular_velocity)
+                     : text;
+  std::string table;
+  for (const Motion::Key &k : m.table) table += textOf(k.time) + textOf(k.displacement) + textOf(k.rotation);
+  return text + ", motion by a table of " + std::to_string(m.table.size()) + " rows, #" + hashOf(table);
+}
+
+using Kind = RunFacts::Kind;
+constexpr const char *kinds[] = {"option", "load", "scene", "start"};
+constexpr const char *order_of_rods = "order of the rods", *names_of_rods = "names of the rods";
+
+} // namespace
+
+std::string textOf(const std::vector<RunFacts::Fact> &facts) {
+  std::string text;
+  for (const RunFacts::Fact &f : facts) text += std::string(kinds[int(f.kind)]) + '\t' + f.name + '\t' + f.value + '\n';
+  return text;
+}
+
+FactValues factsOf(const std::string &text) {
+  FactValues values;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find('\n', at), text.size()), tab = text.find('\t', at),
+                      second = text.find('\t', tab + 1);
+    if (tab < end && second < end) {
+      std::string &value = values[{text.substr(at, tab - at), text.substr(tab + 1, second - tab - 1)}];
+      value += (value.empty() ? "" : " and ") + text.substr(second + 1, end - second - 1);
+    }
+    at = end + 1;
+  }
+  return values;
+}
+
+int compareFacts(const FactValues &before, const FactValues &now, bool options, std::vector<std::string> *told) {
+  constexpr std::size_t most = 20;
+  int kind = 0;
+  std::vector<std::string> lines;
+  FactValues all = before;
+  all.insert(now.begin(), now.end());
+  for (const auto &[key, any] : all) {
+    const auto old = before.find(key), present = now.find(key);
+    const bool gone = present == now.end(), added = old == before.end();
+    if (!gone && !added && old->second == present->second) continue;
+    if (key.first == kinds[int(Kind::option)] && (!options || gone || added)) continue; // an option of another method
+    if (key.first == kinds[int(Kind::start)]) {
+      lines.push_back("changed since the checkpoint, but only for the start, so that it is ignored: " + key.second +
+                      ": " + (added ? "none" : old->second) + " -> " + (gone ? "none" : present->second));
+      continue;
+    }
+    if (added && (key.second == order_of_rods || key.second == names_of_rods))
+      continue; // earlier versions did not keep it
+    for (int k = 0; k < 3; ++k)
+      if (key.first == kinds[k]) kind = std::max(kind, k);
+    const bool is_long = any.find('#') != std::string::npos;
+    const std::string value = is_long ? "" : ": " + any;
+    lines.push_back(gone      ? "no longer there: " + key.second + value
+                    : added   ? "new since the checkpoint: " + key.second + value
+                    : is_long ? "changed since the checkpoint: " + key.second
+                              : "changed since the checkpoint: " + key.second + ": " + old->second + " -> " +
+                                    present->second);
+  }
+  for (std::size_t k = 0; k < lines.size() && k < most; ++k) told->push_back(lines[k]);
+  if (lines.size() > most) told->push_back("... and " + std::to_string(lines.size() - most) + " more changes");
+  return kind;
+}
+
+bool areInAnotherOrder(const FactValues &before, const FactValues &now) {
+  const std::pair<std::string, std::string> order{kinds[int(Kind::scene)], order_of_rods},
+      names{kinds[int(Kind::scene)], names_of_rods};
+  return before.count(order) && before.at(order) != now.at(order) && before.at(names) == now.at(names);
+}
+
+RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::string &text)
+    : dynamic(settings.dynamic), integrator(settings.dynamic ? settings.integrator.name : "statics"), dt(settings.dt),
+      scene_hash(hashOf(text)) {
+  auto add = [&](Kind kind, const std::string &name, const std::string &value) {
+    facts.push_back({kind, inOneLine(name), inOneLine(value)});
+  };
+  auto option = [&](const char *name, const auto &value) {
+    if constexpr (std::is_convertible_v<decltype(value), std::string>)
+      add(Kind::option, name, value);
+    else
+      add(Kind::option, name, textOf(double(value)));
+  };
+  if (dynamic) {
+    option("dt", dt);
+    option("integrator", integrator);
+    if (integrator == "generalized_alpha") option("rho_inf", settings.integrator.rho_inf);
+    option("dt_adapt", settings.adapt == Adaptation::error ? "error" : "none");
+    if (settings.adapt == Adaptation::error) {
+      option("dt_rtol", settings.dt_rtol);
+      option("dt_atol", settings.dt_atol);
+      option("dt_max", settings.dt_max);
+    }
+    option("output_interval", settings.output_interval);
+  } else {
+    option("load_steps", std::to_string(std::lround(1 / dt)));
+  }
+  option("stretch", settings.mixed ? "mixed" : "primal");
+  option("retraction", settings.solve.retraction == RetractionKind::length ? "length" : "additive");
+  option("hessian", settings.hessian == HessianKind::exact ? "exact" : "gauss_newton");
+  option("line_search", settings.solve.line_search == LineSearchKind::energy  ? "energy"
+                        : settings.solve.line_search == LineSearchKind::wolfe ? "wolfe"
+                                                                              : "residual");
+  option("quasi_newton", settings.solve.quasi_newton);
+  option("rounding_tolerance", settings.solve.rounding_tolerance);
+
+  add(Kind::scene, "gravity", textOf(scene.gravity));
+  if (!scene.rotation.angular_velocity.isZero(0))
+    add(Kind::scene, "rotation", textOf(scene.rotation.angular_velocity) + " about " + textOf(scene.rotation.centre));
+  Digest topology, order, set;
+  std::vector<std::string> names;
+  for (const Rod &rod : scene.rods) {
+    names.push_back(rod.name);
+    order.add(rod.name + "\n");
+    std::string start = rod.initial_velocity.isZero(0) ? "" : "velocity " + textOf(rod.initial_velocity);
+    if (rod.initial_turns != 0) start += (start.empty() ? "turns " : ", turns ") + textOf(rod.initial_turns);
+    if (!start.empty()) add(Kind::start, "start of rod '" + rod.name + "'", start);
+    const int sizes[] = {rod.vertices(), rod.edges(), int(rod.closed)};
+    topology.add(sizes, sizeof sizes);
+    const std::string of = " of rod '" + rod.name + "'";
+    add(Kind::scene, "material" + of, textOf(rod.material));
+    add(Kind::scene, "law" + of,
+        std::string(rod.measure == Measure::tan ? "measure tan" : "measure angle") +
+            (rod.energy == Energy::seed ? ", energy seed" : ", energy classical") +
+            (rod.gravity ? "" : ", without gravity"));
+    Digest shape;
+    shape.add(rod.position.data(), rod.position.size() * sizeof(Vec3));
+    shape.add(rod.director.data(), rod.director.size() * sizeof(Vec3));
+    shape.add(rod.natural == Rod::Natural::given ? textOf(rod.natural_strain) : "");
+    add(Kind::scene, "shape at rest" + of, "#" + shape.hex());
+  }
+  topology_hash = topology.hex();
+  std::sort(names.begin(), names.end());
+  for (const std::string &name : names) set.add(name + "\n");
+  add(Kind::scene, order_of_rods, "#" + order.hex());
+  add(Kind::scene, names_of_rods, "#" + set.hex());
+  auto at = [&](const char *what, int place, int rod) {
+    return std::string(what) + std::to_string(place) + " of rod '" + scene.rods[rod].name + "'";
+  };
+  for (const Support &s : scene.supports) add(Kind::scene, at("support at vertex ", s.vertex, s.rod), textOf(s));
+  for (const NodalForce &f : scene.forces) add(Kind::load, at("force on vertex ", f.vertex, f.rod), textOf(f.force));
+  for (const EdgeMoment &m : scene.moments) {
+    if (m.torque != 0) add(Kind::load, at("torque on edge ", m.edge, m.rod), textOf(m.torque));
+    if (!m.moment.isZero(0)) add(Kind::load, at("moment on edge ", m.edge, m.rod), textOf(m.moment));
+  }
+}
+
+} // namespace tendril

@@ -1,0 +1,227 @@
+/// Newton's direction: the factored Hessian and its inertia, shifts that make it a way down, supports that move,
+/// couples.
+#include "tendril/solver/newton.hpp"
+
+namespace tendril {
+
+/// Negative pivots of the factored matrix, per rod where the factorisation tells; `regular` is false when it broke
+/// down.
+PetscErrorCode NewtonSolver::readInertia(bool *regular) {
+  PC pc;
+  Mat factor;
+  PCFailedReason failed;
+  PetscFunctionBeginUser;
+  PetscCall(KSPGetPC(factored(), &pc));
+  PetscCall(PCGetFailedReason(pc, &failed));
+  *regular = failed == PC_NOERROR;
+  fill(work_->negative, 0);
+  fill(work_->zero, 0);
+  report_.zero_pivots = report_.negative_pivots = 0;
+  if (!*regular) PetscFunctionReturn(0);
+  PetscCall(PCFactorGetMatrix(pc, &factor));
+  if (const BandedFactor *banded = bandedFactorOf(factor)) {
+    for (int r = rods_.begin; r < rods_.end; ++r) {
+      if (!work_->wanted[r]) continue;
+      report_.negative_pivots += work_->negative[r] = banded->negativePivots(r);
+      report_.zero_pivots += work_->zero[r] = banded->zeroPivots(r);
+    }
+  } else {
+    PetscInt minus, zero, plus;
+    PetscCall(MatGetInertia(factor, &minus, &zero, &plus));
+    fill(work_->negative, report_.negative_pivots = int(minus));
+    fill(work_->zero, report_.zero_pivots = int(zero));
+  }
+  PetscFunctionReturn(0);
+}
+
+/// The factorisation with an inertia; where the solver that was chosen broke down, the direction comes from it.
+PetscErrorCode NewtonSolver::solveAgain(Vec f, Vec y) {
+  KSP ksp;
+  KSPConvergedReason reason;
+  PetscFunctionBeginUser;
+  if (!inertia_) PetscFunctionReturn(0);
+  PetscCall(KSPSetOperators(inertia_, band_, band_));
+  PetscCall(KSPSetUp(inertia_));
+  PetscCall(SNESGetKSP(snes_, &ksp));
+  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  if (reason < 0) PetscCall(KSPSolve(inertia_, f, y));
+  PetscFunctionReturn(0);
+}
+
+/// First shift to try [1/s^2]: the slowest bending wave of the rod where it is fastest, EI/(rho L^4), or the edge's own
+/// axial one for a cable.
+double NewtonSolver::firstShift(int r) const {
+  const Rod &rod = potential_->scene().rods[r];
+  const double length = potential_->length(r);
+  const Material &m = rod.material;
+  const auto [k1, k2] = m.flexural_stiffness;
+  const double softest = k1 > 0 && k2 > 0 ? std::min(k1, k2) : std::max(k1, k2);
+  const double stiffness = m.isCable() ? 1e-6 * m.axial_stiffness : 10 * softest / (length * length);
+  return stiffness / (m.linear_density * length * length);
+}
+
+/// Adds multiples of the metric to the indefinite Hessians until all pivots are positive, so that the step goes
+/// downhill. Starts near the last shift that was needed, so that a run of indefinite iterates costs one extra
+/// factorisation each.
+PetscErrorCode NewtonSolver::shiftUntilPositive(bool regular) {
+  PetscFunctionBeginUser;
+  for (int attempt = 0; attempt < 40; ++attempt) {
+    bool any = false;
+    for (int r = rods_.begin; r < rods_.end; ++r) {
+      if (!work_->indefinite[r] || (work_->negative[r] + work_->zero[r] == 0 && regular)) continue;
+      double &shift = work_->shift[r];
+      shift = shift > 0 ? 8 * shift : work_->last_shift[r] > 0 ? 0.25 * work_->last_shift[r] : firstShift(r);
+      work_->last_shift[r] = shift;
+      any = true;
+    }
+    if (!any) break;
+    PetscCall(refactor());
+    PetscCall(readInertia(&regular));
+    ++report_.shifts;
+  }
+  PetscFunctionReturn(0);
+}
+
+/// Rods whose Hessian gives no way down as it is: with negative pivots, or with zero ones where forces act on the
+/// motions that they leave out. `y`: Newton's direction.
+PetscErrorCode NewtonSolver::findIndefinite(Vec y, bool regular, bool *any) {
+  constexpr double little = 1e-3; // of the forces
+  PetscFunctionBeginUser;
+  bool scattered = false;
+  *any = false;
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    char &indefinite = work_->indefinite[r];
+    indefinite = work_->wanted[r] && (work_->negative[r] > 0 || !regular);
+    if (work_->wanted[r] && !indefinite && work_->zero[r] > 0 && !isAtNoise(work_->residual[r], 0)) {
+      if (!scattered) PetscCall(potential_->dofs().scatter(y, rods_, work_->increment));
+      scattered = true;
+      const RodRange &rod = potential_->elements().rods[r];
+      const Planes &gradient = potential_->derivatives({r, r + 1}).gradient;
+      Planes &rest = work_->coordinates; // free until the iterate is written
+      for (int a = 0; a < slot_size; ++a) std::fill(rest[a] + rod.first_slot, rest[a] + rod.vertexEnd() + 2, 0.0);
+      potential_->blocks().multiply(rod, work_->increment, rest);
+      potential_->dofs().fold(rod, rest);
+      const double *freedom = potential_->elements().freedom();
+      double forces = 0, out_of_balance = 0;
+      for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
+        for (int a = 0; a < slot_size; ++a) {
+          const double weight = a < 3 ? freedom[s] : rod.twist ? 1 / std::pow(potential_->length(r), 2) : 0;
+          forces += weight * std::pow(gradient[a][s], 2);
+          out_of_balance += weight * std::pow(gradient[a][s] - rest[a][s], 2);
+        }
+      indefinite = out_of_balance > little * little * forces;
+    }
+    *any = *any || indefinite;
+  }
+  PetscFunctionReturn(0);
+}
+
+/// Direction for an indefinite Hessian. A few negative pivots mean a state near a branching: a shifted diagonal keeps
+/// most of Newton's speed there. Many mean compressed edges: then their compression is left out of the Hessian, and the
+/// diagonal shifted only if that is not enough. In statics an equilibrium of couples need not be a minimum of anything:
+/// there Newton's own direction stands.
+PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
+  constexpr int few = 4;          // the two planes of the first two buckling modes
+  constexpr double longest = 0.1; // of the rod's length
+  PetscFunctionBeginUser;
+  if (regular && circulatory_ && potential_->step().isStatic()) {
+    fill(work_->indefinite, false);
+    PetscFunctionReturn(0);
+  }
+  const int unshifted = report_.negative_pivots;
+  const HessianKind kind =
+      potential_->step().hessian == HessianKind::exact ? HessianKind::uncompressed : potential_->step().hessian;
+  bool compressed = false;
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    if (!work_->wanted[r] || work_->negative[r] <= (banded_ || inertia_ ? few : few * (rods_.end - rods_.begin)))
+      continue;
+    potential_->assembleRod(r, kind);
+    compressed = true;
+  }
+  if (compressed) {
+    PetscCall(refactor());
+    PetscCall(readInertia(&regular));
+    ++report_.shifts;
+  }
+  PetscCall(shiftUntilPositive(regular));
+  PetscCall(KSPSolve(factored(), f, y));
+  // A direction far longer than the rod comes of motions almost without stiffness: a larger shift, instead of a line
+  // search that cuts all of it.
+  for (bool longer = potential_->step().isStatic(); longer;) {
+    longer = false;
+    PetscCall(potential_->dofs().scatter(y, rods_, work_->increment));
+    for (int r = rods_.begin; r < rods_.end; ++r)
+      if (work_->wanted[r] && work_->shift[r] > 0 &&
+          work_->edge_metric[potential_->elements().rods[r].first_slot] > 0) { // what hangs on one place swings
+        const double size = sizeOf(r, work_->increment);
+        if (!(size > longest)) continue;
+        work_->last_shift[r] = work_->shift[r] *= std::min(size / longest, 1e6);
+        longer = true;
+      }
+    if (!longer) break;
+    PetscCall(refactor());
+    ++report_.shifts;
+    PetscCall(KSPSolve(factored(), f, y));
+  }
+  report_.negative_pivots = unshifted;
+  PetscFunctionReturn(0);
+}
+
+/// Newton direction for supports that still have to move: solves again with their increments on the right-hand side.
+PetscErrorCode NewtonSolver::includeMotion(Vec y) {
+  KSP ksp;
+  PetscFunctionBeginUser;
+  const DofMap &dofs = potential_->dofs();
+  Planes &right = work_->coordinates; // free until the iterate is written
+  const Planes &gradient = potential_->derivatives(rods_).gradient;
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    const RodRange &rod = dofs.rods()[r];
+    for (int a = 0; a < slot_size; ++a)
+      std::copy(gradient[a] + rod.first_slot, gradient[a] + rod.vertexEnd() + 2, right[a] + rod.first_slot);
+    potential_->blocks().multiply(rod, work_->motion, right);
+    dofs.fold(rod, right);
+  }
+  PetscCall(dofs.gather(right, rods_, right_, &work_->wanted));
+  PetscCall(SNESGetKSP(snes_, &ksp));
+  PetscCall(KSPSolve(ksp, right_, y));
+  PetscFunctionReturn(0);
+}
+
+/// Newton direction of the whole derivative, couples included, from that of its symmetric part, in work_->increment.
+PetscErrorCode NewtonSolver::includeCirculation(bool *regular) {
+  PetscFunctionBeginUser;
+  PetscCall(
+      circulatory_->update([this](const Planes &right, Planes &solution) { return solveLinear(right, solution); }));
+  *regular = circulatory_->correct(work_->increment);
+  PetscFunctionReturn(0);
+}
+
+/// The direction y along which a line search goes, of any type: x - length y. It comes as the solution of the matrix
+/// factored last with the gradient f, and becomes a way down, with the supports that move and the couples.
+PetscErrorCode NewtonSolver::direct(Vec x, Vec f, Vec y) {
+  bool regular, possible;
+  PetscFunctionBeginUser;
+  PetscCall(moveTo(x, &possible));
+  if (fresh_)
+    PetscCall(solveAgain(f, y));
+  else
+    PetscCall(secants_.apply(
+        potential_->dofs(), rods_,
+        [this](Vec right, Vec solution) -> PetscErrorCode { return KSPSolve(factored(), right, solution); }, f, right_,
+        y));
+  PetscCall(readInertia(&regular));
+  bool indefinite = false;
+  fill(work_->indefinite, false);
+  if (fresh_ && seek_ == Seek::minimum) PetscCall(findIndefinite(y, regular, &indefinite));
+  if (indefinite) PetscCall(makeDescent(f, y, regular));
+  if (std::any_of(work_->moving.begin() + rods_.begin, work_->moving.begin() + rods_.end, [](char m) { return m; }))
+    PetscCall(includeMotion(y));
+  if (circulatory_) {
+    PetscCall(potential_->dofs().scatter(y, rods_, work_->increment));
+    PetscCall(includeCirculation(&regular)); // where all of it is singular, the symmetric part has to do
+    PetscCall(potential_->dofs().gather(work_->increment, rods_, y));
+  }
+  PetscFunctionReturn(0);
+}
+
+} // namespace tendril

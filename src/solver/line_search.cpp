@@ -1,0 +1,183 @@
+/// The line search `retraction`: along the manifold, rod by rod.
+#include "tendril/solver/events.hpp"
+#include "tendril/solver/newton.hpp"
+
+#include <petsc/private/snesimpl.h>
+
+#include <algorithm>
+
+namespace tendril {
+
+const IncrementalPotential::RodEnergy &NewtonSolver::energyAtIterate(int r) {
+  if (!work_->energy_known[r]) work_->energy[r] = potential_->rodEnergy(potential_->iterate(), r);
+  work_->energy_known[r] = true;
+  return work_->energy[r];
+}
+
+/// Whether the residual of a rod has fallen enough at the trial.
+bool NewtonSolver::residualFalls(int r, double length, const IncrementalPotential::RodEnergy &trial) {
+  constexpr double sufficient = 1e-4;
+  Configuration &kept = work_->kept;
+  if (kept.empty()) kept = potential_->iterate();
+  kept.copyRod(potential_->elements(), r, potential_->iterate());
+  potential_->accept(work_->trial, r);
+  potential_->gradient(r);
+  const Residual now = potential_->residual(r, trial), before = work_->residual[r];
+  potential_->accept(kept, r);
+  auto size = [](const Residual &residual) { return std::hypot(residual.force, residual.moment); };
+  return now.isFinite() &&
+         (size(now) <= (1 - sufficient * length) * size(before) || excess(now, rtol_) <= 1 || isAtNoise(now, rtol_));
+}
+
+/// Moves one rod along its increment; false when no length of the step lowers its energy enough.
+bool NewtonSolver::searchRod(int r, double *lambda) {
+  constexpr double sufficient = 1e-4;
+  constexpr int most_trials = 40;
+  const RodRange &rod = potential_->elements().rods[r];
+  double slope = -dot(rod, potential_->gradient(r).gradient, work_->increment);
+  if (!std::isfinite(slope)) return false;
+  for (int a = 0; a < slot_size; ++a)
+    for (int s = rod.first_slot; s < rod.vertexEnd() + (rod.closed ? 2 : 0); s += lanes) {
+      const Pack d = read<Pack>(work_->increment[a] + s);
+      write(work_->increment[a] + s, work_->moving[r] ? Pack(read<Pack>(work_->motion[a] + s) - d) : Pack(-d));
+    }
+  const IncrementalPotential::RodEnergy before = energyAtIterate(r);
+  IncrementalPotential::RodEnergy after;
+  Standstill &standstill = work_->standstill[r];
+  standstill.known = fresh_ && !work_->indefinite[r] && !work_->moving[r];
+  standstill.partial = work_->zero[r] > 0;
+  standstill.energy = slope;
+  auto attempt = [&](double length) {
+    ++report_.trials;
+    (void)PetscLogEventBegin(events().configuration, 0, 0, 0, 0);
+    const bool possible = potential_->tryMove(work_->increment, length, r, work_->trial);
+    (void)PetscLogEventEnd(events().configuration, 0, 0, 0, 0);
+    (void)PetscLogEventBegin(events().energy, 0, 0, 0, 0);
+    const IncrementalPotential::RodEnergy energy =
+        possible ? potential_->rodEnergy(work_->trial, r) : IncrementalPotential::RodEnergy{};
+    (void)PetscLogEventEnd(events().energy, 0, 0, 0, 0);
+    return energy;
+  };
+  // Where the symmetric part is indefinite, couples have nothing that an equilibrium would minimise.
+  const bool free = seek_ == Seek::equilibrium ||
+                    (potential_->step().isStatic() && circulatory_ && circulatory_->acts(r) && work_->negative[r] > 0);
+  const LineSearchKind kind = potential_->settings.line_search;
+  enum class Length { good, too_long, too_short };
+  auto judge = [&](double length) {
+    if (!std::isfinite(after.value)) return Length::too_long;
+    // Supports that move do work: the energy may rise with them, and only has to be finite.
+    if (work_->moving[r] || free) return Length::good;
+    if (kind == LineSearchKind::residual) return residualFalls(r, length, after) ? Length::good : Length::too_long;
+    if (!(after.value <= before.value + sufficient * length * slope + before.noise)) return Length::too_long;
+    constexpr double apart = 1e-3, flat = 0.9;
+    if (kind != LineSearchKind::wolfe || -slope * length * apart < 10 * before.noise) return Length::good;
+    const double beyond = attempt(length * (1 + apart)).value, ahead = attempt(length * (1 - apart)).value;
+    attempt(length); // is the trial again
+    const double there = (beyond - ahead) / (2 * apart * length);
+    return there < flat * slope ? Length::too_short : there > -flat * slope ? Length::too_long : Length::good;
+  };
+  *lambda = 1;
+  bool accepted = false;
+  double low = 0, high = HUGE_VAL;
+  for (int trial = 0; trial < most_trials && !accepted; ++trial) {
+    after = attempt(*lambda);
+    const Length length = judge(*lambda);
+    accepted = length == Length::good;
+    if (accepted) break;
+    (length == Length::too_short ? low : high) = *lambda;
+    if (kind == LineSearchKind::wolfe && std::isfinite(after.value)) {
+      *lambda = std::isfinite(high) ? 0.5 * (low + high) : 2 * *lambda;
+      continue;
+    }
+    // Minimum of the parabola through both energies and the slope, kept within a fifth and a half.
+    const double curvature = after.value - before.value - *lambda * slope;
+    const double best =
+        std::isfinite(after.value) && curvature > 0 ? -slope * *lambda * *lambda / (2 * curvature) : 0.5 * *lambda;
+    *lambda = std::clamp(best, 0.2 * *lambda, 0.5 * *lambda);
+  }
+  if (!accepted) {
+    double size;
+    *lambda = 0; // where the rod stays
+    if (excess(work_->residual[r], rtol_) <= 1) return true;
+    if (!fresh_) return renew_ = true;
+    if (!standstill.known) return false;
+    if (!isLittle(r, &size) && !isNeutral(r)) {
+      if (isAtNoise(work_->residual[r], 0)) lost_ = roundingMessage(r, size);
+      return false;
+    }
+    standstill.iterations = most_trials; // what energies can tell is spent
+    return true;
+  }
+  standstill.tiny = work_->indefinite[r] && *lambda >= 1 && sizeOf(r, work_->increment) < 1e-3;
+  if (*lambda < 0.1) work_->last_shift[r] *= 16; // a shift that leaves too long a step is too small
+  // A full step that gained clearly more than a quadratic would: the minimum lies beyond, as on the way down from a
+  // barrier.
+  const double gain = (after.value - before.value) / slope;
+  if (kind == LineSearchKind::energy && !free && *lambda == 1 && gain > 0.6 && gain < 1 &&
+      -slope > 1e3 * before.noise) {
+    const double longer = std::min(2.0, 0.5 / (1 - gain));
+    const IncrementalPotential::RodEnergy beyond = attempt(longer);
+    if (beyond.value < after.value) {
+      after = beyond;
+      *lambda = longer;
+    } else
+      potential_->tryMove(work_->increment, 1, r, work_->trial);
+  }
+  potential_->accept(work_->trial, r);
+  work_->energy[r] = after;
+  work_->energy_known[r] = potential_->scene().moments.empty(); // the work of couples is counted from the iterate
+  return true;
+}
+
+PetscErrorCode NewtonSolver::keepGradient(Vec f, std::vector<double> *kept) {
+  const double *values;
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArrayRead(f, &values));
+  kept->assign(values, values + potential_->dofs().unknowns(rods_));
+  PetscCall(VecRestoreArrayRead(f, &values));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
+  Vec x, f, y;
+  PetscBool changed;
+  PetscFunctionBeginUser;
+  PetscCall(SNESLineSearchGetVecs(search, &x, &f, &y, nullptr, nullptr));
+  PetscCall(SNESLineSearchSetReason(search, SNES_LINESEARCH_SUCCEEDED));
+  PetscCall(SNESLineSearchPreCheck(search, x, y, &changed));
+  PetscCall(potential_->dofs().scatter(y, rods_, work_->increment));
+  PetscCall(PetscLogEventBegin(events().line_search, 0, 0, 0, 0));
+  double shortest = 1;
+  bool accepted = true;
+  std::vector<double> before; // the gradient, where secants are wanted
+  if (potential_->settings.quasi_newton > 1) {
+    PetscCall(keepGradient(f, &before));
+    lengths_.assign(rods_.end - rods_.begin, 0.0);
+  }
+  for (int r = rods_.begin; r < rods_.end && accepted; ++r) {
+    if (!work_->wanted[r]) continue;
+    double lambda;
+    accepted = searchRod(r, &lambda);
+    if (!before.empty()) lengths_[r - rods_.begin] = lambda;
+    shortest = std::min(shortest, lambda);
+    report_.edge_iterations += potential_->elements().rods[r].edges;
+  }
+  PetscCall(PetscLogEventEnd(events().line_search, 0, 0, 0, 0));
+  PetscCall(SNESLineSearchSetLambda(search, shortest));
+  if (!accepted) {
+    PetscCall(SNESLineSearchSetReason(search, SNES_LINESEARCH_FAILED_REDUCT));
+    PetscFunctionReturn(0);
+  }
+  PetscCall(writeIterate(x));
+  PetscCall(SNESComputeFunction(snes_, x, f));
+  if (!before.empty()) {
+    PetscCall(potential_->dofs().gather(work_->increment, rods_, right_));
+    PetscCall(secants_.add(potential_->dofs(), rods_, right_, lengths_, before, f));
+  }
+  PetscReal norm = 0; // only monitors look at it; those of x and y serve tests that are not used here
+  if (snes_.object()->numbermonitors > 0) PetscCall(VecNorm(f, NORM_2, &norm));
+  PetscCall(SNESLineSearchSetNorms(search, 0, norm, 0));
+  PetscFunctionReturn(0);
+}
+
+} // namespace tendril

@@ -1,0 +1,135 @@
+/// How SNES and its parts are made, and what they call.
+#include "tendril/solver/newton.hpp"
+
+#include <petsc/private/linesearchimpl.h>
+
+namespace tendril {
+namespace {
+
+constexpr const char *line_search_name = "retraction";
+
+PetscErrorCode functionCallback(SNES, Vec x, Vec f, void *context) {
+  return static_cast<NewtonSolver *>(context)->evaluate(x, f);
+}
+
+PetscErrorCode jacobianCallback(SNES, Vec, Mat, Mat p, void *context) {
+  return static_cast<NewtonSolver *>(context)->assemble(p);
+}
+
+PetscErrorCode convergenceCallback(SNES, PetscInt it, PetscReal, PetscReal, PetscReal, SNESConvergedReason *reason,
+                                   void *context) {
+  return static_cast<NewtonSolver *>(context)->testConvergence(it, reason);
+}
+
+PetscErrorCode directionCallback(SNESLineSearch search, Vec x, Vec y, PetscBool *changed, void *context) {
+  Vec f;
+  PetscFunctionBeginUser;
+  PetscCall(SNESLineSearchGetVecs(search, nullptr, &f, nullptr, nullptr, nullptr));
+  PetscCall(static_cast<NewtonSolver *>(context)->direct(x, f, y));
+  *changed = PETSC_TRUE;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode lineSearchApply(SNESLineSearch search) {
+  SNES snes;
+  void *context;
+  PetscFunctionBeginUser;
+  PetscCall(SNESLineSearchGetSNES(search, &snes));
+  PetscCall(SNESGetApplicationContext(snes, &context));
+  PetscCall(static_cast<NewtonSolver *>(context)->lineSearch(search));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode createLineSearch(SNESLineSearch search) {
+  PetscFunctionBeginUser;
+  search->ops->apply = lineSearchApply;
+  PetscFunctionReturn(0);
+}
+
+/// MUMPS counts pivots only when it looks for null ones, and a large pivot leaves their variables out. Options of the
+/// same names (options/mumps_inertia.yaml) go before these values: PETSc reads them later.
+PetscErrorCode askMumpsForInertia([[maybe_unused]] PC pc, [[maybe_unused]] Mat matrix) {
+  PetscFunctionBeginUser;
+#if defined(PETSC_HAVE_MUMPS)
+  Mat factor;
+  PetscCall(PCSetOperators(pc, matrix, matrix));
+  PetscCall(PCFactorSetUpMatSolverType(pc));
+  PetscCall(PCFactorGetMatrix(pc, &factor));
+  PetscCall(MatMumpsSetIcntl(factor, 24, 1));
+  PetscCall(MatMumpsSetCntl(factor, 5, 1e20));
+#endif
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode registerSolvers() {
+  PetscFunctionBeginUser;
+  PetscCall(SNESLineSearchRegister(line_search_name, createLineSearch));
+  PetscCall(registerBanded());
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &work, RodSet set) {
+  KSP ksp;
+  PC pc;
+  SNESLineSearch search;
+  PetscFunctionBeginUser;
+  potential_ = &potential;
+  rods_ = set;
+  DofMap &dofs = potential.dofs();
+  work_ = &work;
+  if (circulatory_.emplace(potential, set); circulatory_->isNone()) circulatory_.reset();
+  system_ = {&dofs,        set,         &potential.blocks(), &work.metric,
+             &work.wanted, &work.shift, &work.workspace,     !potential.scene().rotation.angular_velocity.isZero(0)};
+  const bool whole = set.begin == 0 && set.end == dofs.all().end;
+  if (whole)
+    PetscCall(DMCreateGlobalVector(dofs.dm(), x_.out()));
+  else
+    PetscCall(VecCreateSeq(PETSC_COMM_SELF, dofs.unknowns(set), x_.out()));
+  for (OwnedVec *v : {&f_, &right_, &solution_}) PetscCall(VecDuplicate(x_, v->out()));
+  PetscCall(SNESCreate(whole ? PETSC_COMM_WORLD : PETSC_COMM_SELF, snes_.out()));
+  if (whole) PetscCall(SNESSetDM(snes_, dofs.dm()));
+  PetscCall(SNESSetApplicationContext(snes_, this));
+  PetscCall(SNESSetType(snes_, SNESNEWTONLS));
+  PetscCall(SNESSetFunction(snes_, f_, functionCallback, this));
+  PetscCall(SNESSetConvergenceTest(snes_, convergenceCallback, this, nullptr));
+  // A step length of zero is never convergence: stol 0. rtol is relative to the load scale of each rod.
+  PetscCall(SNESSetTolerances(snes_, 0, 1e-6, 0, 100, PETSC_MAX_INT));
+  PetscCall(SNESSetMaxLinearSolveFailures(snes_, PETSC_MAX_INT)); // a singular Hessian is shifted by the line search
+  PetscCall(SNESGetLineSearch(snes_, &search));
+  PetscCall(SNESLineSearchSetType(search, line_search_name));
+  PetscCall(SNESGetKSP(snes_, &ksp));
+  PetscCall(KSPSetType(ksp, KSPPREONLY));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PCSetType(pc, PCCHOLESKY));
+  PetscCall(PCFactorSetMatSolverType(pc, "banded"));
+  PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGNATURAL));
+  PetscCall(PCFactorSetZeroPivot(
+      pc, 1e-250)); // for PETSc's own: pivots have the units of a stiffness, no absolute bound makes sense
+  PetscCall(SNESLineSearchSetPreCheck(search, directionCallback, this));
+  PetscCall(SNESSetFromOptions(snes_));
+  MatSolverType type = nullptr;
+  PetscBool cholesky;
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &cholesky));
+  PetscCall(PCFactorGetMatSolverType(pc, &type));
+  banded_ = cholesky && type && std::string(type) == "banded";
+  if (banded_) // factored straight from the band; every other solver gets a matrix of PETSc's own
+    PetscCall(createBandedMatrix(&system_, jacobian_.out()));
+  else
+    PetscCall(dofs.createMatrix(jacobian_.out()));
+  PetscCall(SNESSetJacobian(snes_, jacobian_, jacobian_, jacobianCallback, this));
+  if (type && std::string(type) == MATSOLVERMUMPS) PetscCall(askMumpsForInertia(pc, jacobian_));
+  if (!cholesky) {
+    PetscCall(createBandedMatrix(&system_, band_.out()));
+    PetscCall(KSPCreate(PETSC_COMM_SELF, inertia_.out()));
+    PetscCall(KSPSetType(inertia_, KSPPREONLY));
+    PetscCall(KSPGetPC(inertia_, &pc));
+    PetscCall(PCSetType(pc, PCCHOLESKY));
+    PetscCall(PCFactorSetMatSolverType(pc, "banded"));
+    PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGNATURAL));
+  }
+  PetscFunctionReturn(0);
+}
+
+} // namespace tendril

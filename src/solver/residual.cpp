@@ -1,0 +1,115 @@
+#include "tendril/solver/residual.hpp"
+
+#include <limits>
+#include <map>
+
+namespace tendril {
+
+using C = Configuration;
+
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
+
+double edgeError(double reach, double edge) { return epsilon * (1 + epsilon * reach / edge); }
+
+/// Loads on a rod [N]: its weight, and the forces and couples on what is free to move.
+static double loadOn(const Scene &scene, int r, double length) {
+  const Rod &rod = scene.rods[r];
+  double s = rod.gravity ? rod.material.linear_density * length * scene.gravity.norm() : 0;
+  s += rod.material.linear_density * length * length * scene.rotation.angular_velocity.squaredNorm();
+  auto held = [&](int vertex) {
+    return std::any_of(scene.supports.begin(), scene.supports.end(), [&](const Support &support) {
+      return support.rod == r && support.vertex == vertex && support.holdsPosition();
+    });
+  };
+  std::map<int, Vec3> force; // per vertex: forces that cancel are none
+  for (const NodalForce &f : scene.forces)
+    if (f.rod == r) force.try_emplace(f.vertex, Vec3::Zero()).first->second += f.force;
+  for (const auto &[vertex, f] : force)
+    if (!held(vertex)) s += f.norm();
+  for (const EdgeMoment &c : scene.moments)
+    if (c.rod == r) s += (std::abs(c.torque) + c.moment.norm()) / length;
+  return s;
+}
+
+std::vector<RodScale> rodScales(const Scene &scene, const Elements &elements) {
+  std::vector<RodScale> scales;
+  for (std::size_t r = 0; r < elements.rods.size(); ++r) {
+    const RodRange &rod = elements.rods[r];
+    RodScale scale;
+    scale.shortest_edge = HUGE_VAL;
+    for (int s = rod.first_slot; s < rod.edgeEnd(); ++s) {
+      scale.length += elements.restLength()[s];
+      scale.shortest_edge = std::min(scale.shortest_edge, elements.restLength()[s]);
+      scale.longest_edge = std::max(scale.longest_edge, elements.restLength()[s]);
+    }
+    for (int n = elements.rod_cells[r]; n < elements.rod_cells[r + 1]; ++n)
+      for (int k = 0; k < 3; ++k) scale.bending += elements.cells()[cell_stiffness + k][elements.cell_slot[n]];
+    scale.load = loadOn(scene, int(r), scale.length);
+    scales.push_back(scale);
+  }
+  return scales;
+}
+
+double forceScale(const Scene &scene, const Elements &elements, const Step &step, const State &start,
+                  const RodScale &scale, int r) {
+  if (scale.load > 0) return scale.load;
+  const Material &m = scene.rods[r].material;
+  const RodRange &rod = elements.rods[r];
+  double softest = 1e-4 * m.axial_stiffness * scale.length * scale.length;
+  if (!m.isCable())
+    for (const double k : {m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness})
+      if (k > 0) softest = std::min(softest, k);
+  const double deforming = softest / (scale.length * scale.length);
+  if (step.isStatic()) return deforming;
+  double momentum = 0;
+  for (int i = 0; i < rod.vertices; ++i)
+    momentum += elements.mass()[rod.slot(i)] * start.velocity[rod.first_vertex + i].norm();
+  return momentum > 0 ? std::min(deforming, momentum / step.dt) : deforming;
+}
+
+Residual residualOf(const Elements &elements, const Material &m, const Step &step, const AxialLaw &axial,
+                    const Configuration &iterate, const Planes &out_of_balance, const RodScale &scale, double reach,
+                    double steepness, const RodRange &rod) {
+  using std::abs;
+  Pack forces(0.0), moments(0.0), tension(0.0), error(0.0);
+  for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) {
+    forces += read<Pack>(elements.freedom() + s) * readVector<Pack>(out_of_balance, 0, s).squaredNorm();
+    const Pack g = read<Pack>(out_of_balance[3] + s);
+    moments += g * g;
+  }
+  for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
+    const Pack::mask_type live = firstLanes(rod.edgeEnd() - s);
+    const Pack force = read<Pack>(iterate[C::axial_force] + s),
+               strain = read<Pack>(iterate[C::strain] + s) - read<Pack>(axial.rest() + s);
+    tension = max(tension, select(live, Pack(abs(force)), Pack(0.0)));
+    error = max(error, select(live, Pack(abs(strain - force / read<Pack>(axial.stiffness() + s))), Pack(0.0)));
+  }
+  const double force = reduce(forces), moment = reduce(moments);
+  // Edges carry errors of epsilon in their strains and directions, which the stiffnesses turn into forces and moments.
+  const double strain_noise = edgeError(reach, scale.shortest_edge), count = std::sqrt(double(rod.vertices));
+  const double bending = steepness *
+                         std::max({m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness}) /
+                         scale.shortest_edge;
+  const double unit = scale.force, stretching = step.mixed ? hmax(tension) : hmax(tension) + m.axial_stiffness;
+  Residual result;
+  result.force = std::sqrt(force) / unit;
+  result.moment = std::sqrt(moment) / (unit * scale.length);
+  result.compatibility = step.mixed ? hmax(error) : 0;
+  // Inertia turns an error of position or twist into a force or a moment, which counts in short steps.
+  const double inertia = step.isStatic() ? 0 : scale.longest_edge / (step.dt * step.dt),
+               heavy = m.linear_density * scale.shortest_edge * inertia,
+               spinning = m.linear_rotational_inertia * inertia;
+  result.force_floor =
+      4 * count * strain_noise * (stretching + heavy + (m.isCable() ? 0 : bending / scale.shortest_edge)) / unit;
+  if (!m.isCable()) result.moment_floor = 4 * count * strain_noise * (bending + spinning) / (unit * scale.length);
+  result.compatibility_floor = 16 * strain_noise;
+  return result;
+}
+
+void Residual::include(const Residual &other) {
+  for (double Residual::*part : {&Residual::force, &Residual::moment, &Residual::compatibility, &Residual::force_floor,
+                                 &Residual::moment_floor, &Residual::compatibility_floor})
+    if (other.*part > this->*part || std::isnan(other.*part)) this->*part = other.*part;
+}
+
+} // namespace tendril

@@ -1,0 +1,72 @@
+#include "tendril/solver/secants.hpp"
+
+#include <cmath>
+
+namespace tendril {
+
+PetscErrorCode Secants::apply(const DofMap &dofs, RodSet rods, const std::function<PetscErrorCode(Vec, Vec)> &solve,
+                              Vec f, Vec work, Vec y) const {
+  PetscFunctionBeginUser;
+  auto forRods = [&](auto visit) {
+    for (int r = rods.begin; r < rods.end; ++r) {
+      const PetscInt begin = dofs.firstUnknown({r, r + 1}) - dofs.firstUnknown(rods);
+      visit(r - rods.begin, begin, begin + dofs.unknowns({r, r + 1}));
+    }
+  };
+  std::vector<std::vector<double>> share(pairs_.size(), std::vector<double>(rods.end - rods.begin));
+  double *q;
+  PetscCall(VecCopy(f, work));
+  PetscCall(VecGetArray(work, &q));
+  for (std::size_t k = pairs_.size(); k-- > 0;)
+    forRods([&](int r, PetscInt begin, PetscInt end) {
+      const Pair &secant = pairs_[k];
+      double product = 0;
+      for (PetscInt i = begin; i < end; ++i) product += secant.step[i] * q[i];
+      share[k][r] = secant.inverse[r] * product;
+      for (PetscInt i = begin; i < end; ++i) q[i] -= share[k][r] * secant.change[i];
+    });
+  PetscCall(VecRestoreArray(work, &q));
+  PetscCall(solve(work, y));
+  PetscCall(VecGetArray(y, &q));
+  for (std::size_t k = 0; k < pairs_.size(); ++k)
+    forRods([&](int r, PetscInt begin, PetscInt end) {
+      const Pair &secant = pairs_[k];
+      double product = 0;
+      for (PetscInt i = begin; i < end; ++i) product += secant.change[i] * q[i];
+      const double factor = share[k][r] - secant.inverse[r] * product;
+      for (PetscInt i = begin; i < end; ++i) q[i] += factor * secant.step[i];
+    });
+  PetscCall(VecRestoreArray(y, &q));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Secants::add(const DofMap &dofs, RodSet rods, Vec direction, const std::vector<double> &lengths,
+                            const std::vector<double> &before, Vec f) {
+  PetscFunctionBeginUser;
+  Pair secant;
+  const double *values;
+  PetscCall(VecGetArrayRead(direction, &values));
+  secant.step.assign(values, values + before.size());
+  PetscCall(VecRestoreArrayRead(direction, &values));
+  PetscCall(VecGetArrayRead(f, &values));
+  secant.change.assign(values, values + before.size());
+  PetscCall(VecRestoreArrayRead(f, &values));
+  for (std::size_t i = 0; i < before.size(); ++i) secant.change[i] -= before[i];
+  for (int r = rods.begin; r < rods.end; ++r) {
+    const PetscInt begin = dofs.firstUnknown({r, r + 1}) - dofs.firstUnknown(rods),
+                   end = begin + dofs.unknowns({r, r + 1});
+    const double length = lengths[r - rods.begin];
+    double product = 0, steps = 0, changes = 0;
+    for (PetscInt i = begin; i < end; ++i) {
+      secant.step[i] *= length;
+      product += secant.step[i] * secant.change[i];
+      steps += secant.step[i] * secant.step[i];
+      changes += secant.change[i] * secant.change[i];
+    }
+    secant.inverse.push_back(product > 1e-10 * std::sqrt(steps * changes) ? 1 / product : 0);
+  }
+  pairs_.push_back(std::move(secant));
+  PetscFunctionReturn(0);
+}
+
+} // namespace tendril

@@ -1,0 +1,73 @@
+#include "tendril/state/support_motion.hpp"
+
+#include <limits>
+
+namespace tendril {
+
+using C = Configuration;
+
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
+
+void SupportMotion::turn(const Configuration &from, double from_time, double to_time) {
+  beyond_barrier_ = false;
+  turned_.clear();
+  for (std::size_t s = 0; s < scene_.supports.size(); ++s) {
+    const int slot = elements_.support_slot[s];
+    const Motion &motion = scene_.supports[s].motion;
+    if (slot < 0 || !motion.moves()) continue;
+    Turned turned{scene_.supports[s].rod, slot, 0.0, from.frameAt(slot)};
+    // In parts of less than half a radian, so that whole turns within the step are counted.
+    const int parts = 1 + int(2 * (motion.rotationVectorAt(to_time) - motion.rotationVectorAt(from_time)).norm());
+    for (int k = 1; k <= parts; ++k) {
+      const double time = k == parts ? to_time : from_time + (to_time - from_time) * k / parts;
+      const Frame now = supportFrame(scene_.supports[s], time);
+      turned.angle += halfAngleBetween(turned.end, now).angle();
+      turned.end = now;
+    }
+    turned_.push_back(turned);
+  }
+}
+
+void SupportMotion::follow(int r, Configuration &iterate) {
+  bool any = false;
+  for (const Turned &turned : turned_) {
+    if (turned.rod != r) continue;
+    iterate.setFrame(turned.slot, turned.end);
+    any = true;
+  }
+  if (!any) return;
+  auto turning = [&](int frame) {
+    for (const Turned &turned : turned_)
+      if (turned.slot == frame) return turned.angle;
+    return 0.0;
+  };
+  forCells(elements_, r, [&]<class T>(const LooseCell &cells, int count) {
+    for (int l = 0; l < count; ++l) {
+      const LooseCell cell{cells.slot + l, cells.frame0 + l, cells.frame1 + l, cells.vertex + l};
+      double &twist = iterate[C::twist][cell.slot], &turns = iterate[C::turns][cell.slot];
+      const double expected = twist + turning(cell.frame1) - turning(cell.frame0);
+      const double principal = halfAngleBetween(iterate.frameAt(cell.frame0), iterate.frameAt(cell.frame1)).angle();
+      turns = 2 * pi * std::round((expected - principal) / (2 * pi));
+      twist = principal + turns;
+      beyond_barrier_ = beyond_barrier_ || (elements_.measure[r] == Measure::tan && turns != 0);
+    }
+  });
+}
+
+bool SupportMotion::remaining(const Configuration &iterate, double time, RodSet rods, Planes &increment) const {
+  bool any = false;
+  for (const Support &s : scene_.supports) {
+    if (s.rod < rods.begin || s.rod >= rods.end || !s.holdsPosition() || !s.motion.moves()) continue;
+    const RodRange &rod = elements_.rods[s.rod];
+    const int slot = rod.slot(s.vertex);
+    const Vec3 target = scene_.rods[s.rod].position[s.vertex] + s.motion.displacementAt(time);
+    Vec3 d = (target - iterate.positionAt(slot)) - iterate.values().vector(C::position_low, slot);
+    if (d.norm() <= 4 * epsilon * target.norm()) d.setZero();
+    any = any || !d.isZero(0);
+    increment.setVector(0, slot, d);
+    dofs_.copyBehindRing(rod, increment);
+  }
+  return any;
+}
+
+} // namespace tendril
