@@ -13,18 +13,6 @@ constexpr const char *cannot_factor =
 constexpr const char *vanishing_edge =
     "an edge vanishes or turns back on itself; use more edges, or a larger axial_stiffness";
 
-void requireDeadLoads(const Scene &scene) {
-  for (const Support &support : scene.supports)
-    if (support.motion.moves())
-      throw SceneError(
-          "the support of rod '" + scene.rods[support.rod].name + "' at vertex " + std::to_string(support.vertex) +
-          " moves: -continuation arclength scales dead loads only; hold the support still or use -continuation load");
-  const bool weight = !scene.gravity.isZero(0) &&
-                      std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &rod) { return rod.gravity; });
-  if (!weight && scene.rotation.angular_velocity.isZero(0) && scene.forces.empty() && scene.moments.empty())
-    throw SceneError("-continuation arclength needs a load to follow: gravity, a force, a torque or a moment");
-}
-
 ArcLength::ArcLength(StepSolver &solver, const LoopSettings &settings)
     : solver_(solver), settings_(settings), metric_(solver.potential().dofs().makePlanes()),
       load_derivatives_(solver.potential().dofs().slots()) {
@@ -115,15 +103,6 @@ bool ArcLength::move(const Planes &increment, double factor) {
   potential.accept(trial_);
   potential.setLoadFactor(factor);
   return true;
-}
-
-/// The rod farthest from equilibrium at the iterate, in words.
-std::string ArcLength::imbalance() {
-  PetscReal rtol;
-  (void)SNESGetTolerances(solver_.snes(), nullptr, &rtol, nullptr, nullptr, nullptr);
-  IncrementalPotential &potential = solver_.potential();
-  const Asked asked{rtol * sharpness_, sharpness_};
-  return tellImbalance(potential, farthestRod(potential, potential.all(), asked), asked);
 }
 
 /// Newton on equilibrium and one constraint: two solves per factorisation, one for the residual and one for the load.

@@ -7,6 +7,18 @@
 
 namespace tendril {
 
+void requireDeadLoads(const Scene &scene) {
+  for (const Support &support : scene.supports)
+    if (support.motion.moves())
+      throw SceneError(
+          "the support of rod '" + scene.rods[support.rod].name + "' at vertex " + std::to_string(support.vertex) +
+          " moves: -continuation arclength scales dead loads only; hold the support still or use -continuation load");
+  const bool weight = !scene.gravity.isZero(0) &&
+                      std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &rod) { return rod.gravity; });
+  if (!weight && scene.rotation.angular_velocity.isZero(0) && scene.forces.empty() && scene.moments.empty())
+    throw SceneError("-continuation arclength needs a load to follow: gravity, a force, a torque or a moment");
+}
+
 /// Equilibrium at the load factor the run begins with: rods need not be at rest as drawn.
 PetscErrorCode ArcLength::findStart(State &state) {
   PetscFunctionBeginUser;
@@ -174,6 +186,15 @@ PetscErrorCode ArcLength::locateBifurcation(const State &start, const State &end
   iterations_ = iterations;
   negative_ = negative;
   PetscFunctionReturn(0);
+}
+
+/// The rod farthest from equilibrium at the iterate, in words.
+std::string ArcLength::imbalance() {
+  PetscReal rtol;
+  (void)SNESGetTolerances(solver_.snes(), nullptr, &rtol, nullptr, nullptr, nullptr);
+  IncrementalPotential &potential = solver_.potential();
+  const Asked asked{rtol * sharpness_, sharpness_};
+  return tellImbalance(potential, farthestRod(potential, potential.all(), asked), asked);
 }
 
 } // namespace tendril

@@ -9,10 +9,13 @@
 #include "tendril/io/keys.hpp"
 #include "tendril/io/option_files.hpp"
 #include "tendril/io/options.hpp"
-#include "tendril/io/output_folder.hpp"
+#include "tendril/io/prepare.hpp"
 #include "tendril/io/progress.hpp"
+#include "tendril/io/provenance.hpp"
+#include "tendril/io/quiet_errors.hpp"
 #include "tendril/io/stop.hpp"
 #include "tendril/io/summary.hpp"
+#include "tendril/io/take_up.hpp"
 #include "tendril/io/text.hpp"
 #include "tendril/solver/activity.hpp"
 #include "tendril/solver/events.hpp"
@@ -26,86 +29,6 @@
 
 namespace tendril {
 namespace {
-
-std::string groupsText(const Scene &scene) {
-  std::ostringstream s;
-  s << std::setprecision(4);
-  const std::size_t shown = std::min<std::size_t>(scene.rods.size(), 4);
-  for (std::size_t r = 0; r < shown; ++r) {
-    const DimensionlessGroups g = dimensionlessGroups(scene.rods[r], scene.gravity);
-    s << "rod '" << scene.rods[r].name << "': " << scene.rods[r].edges() << " edges, length " << g.length << " m";
-    if (scene.rods[r].material.isCable())
-      s << ", a cable\n";
-    else
-      s << ", rho g L^3/EI " << g.gravito_bending << ", EA L^2/EI " << g.axial_to_bending << ", largest turning "
-        << g.largest_turning << " deg and twist " << g.largest_twist << " deg per vertex\n";
-  }
-  if (shown < scene.rods.size()) s << "... and " << scene.rods.size() - shown << " more rods\n";
-  constexpr double soft = 1e-4; // of the rod's own bending
-  double turning = 0, twist = 0;
-  bool told = false;
-  for (const Rod &rod : scene.rods) {
-    if (rod.material.isCable()) continue; // free to fold
-    const DimensionlessGroups g = dimensionlessGroups(rod, scene.gravity);
-    turning = std::max(turning, g.largest_turning);
-    twist = std::max(twist, g.largest_twist);
-    if (told || !(g.corner_softness > soft)) continue;
-    s << "warning: rod '" << rod.name << "' has a corner at vertex " << g.softest_corner
-      << ", which 'energy: seed' makes softer by " << shortText(g.corner_softness)
-      << " of the bending of the whole rod, more with shorter edges, for stretch turns it; use 'energy: classical'\n";
-    told = true;
-  }
-  if (turning > 30 || twist > 30)
-    s << "warning: neighbouring edges turn or twist by up to " << std::max(turning, twist)
-      << " degrees; above 30 the strains are more than 10 % off: use more edges\n";
-  return s.str();
-}
-
-std::string petscVersion() {
-  char version[256];
-  (void)PetscGetVersion(version, sizeof version);
-  return version;
-}
-
-std::string versionText() {
-  return std::string("tendril ") + TENDRIL_VERSION + " (" + TENDRIL_GIT_COMMIT + "), " + petscVersion();
-}
-
-Provenance provenance(int argc, char **argv) {
-  Provenance p;
-  for (int i = 0; i < argc; ++i) {
-    if (i) p.command_line += ' ';
-    p.command_line += argv[i];
-  }
-  char *all = nullptr;
-  if (PetscOptionsGetAll(nullptr, &all) == 0 && all) p.options = all;
-  (void)PetscFree(all);
-  p.version = TENDRIL_VERSION;
-  p.git_commit = TENDRIL_GIT_COMMIT;
-  p.petsc_version = petscVersion();
-  const std::time_t now = std::time(nullptr);
-  char stamp[32];
-  std::strftime(stamp, sizeof stamp, "%Y-%m-%dT%H:%M:%SZ", std::gmtime(&now));
-  p.created = stamp;
-  return p;
-}
-
-/// While it lives, PETSc's errors are kept as one line instead of printed with their trace.
-class QuietErrors {
-public:
-  QuietErrors() { (void)PetscPushErrorHandler(keep, &message_); }
-  ~QuietErrors() { (void)PetscPopErrorHandler(); }
-  QuietErrors(const QuietErrors &) = delete;
-  const std::string &message() const { return message_; }
-
-private:
-  std::string message_;
-  static PetscErrorCode keep(MPI_Comm, int, const char *, const char *, PetscErrorCode code, PetscErrorType type,
-                             const char *text, void *message) {
-    if (type == PETSC_ERROR_INITIAL && text) *static_cast<std::string *>(message) = text;
-    return code;
-  }
-};
 
 /// What PETSc finds wrong with the command line; empty when it has started. An error handler would be memory of ours,
 /// which -malloc_debug takes for corrupted.
@@ -124,91 +47,6 @@ void print(const std::string &text) {
   std::fputs(text.c_str(), stdout);
   if (std::fflush(stdout) != 0 || std::ferror(stdout))
     throw WriteError("standard output cannot be written; is the disk full?");
-}
-
-/// A rod that nothing holds has no equilibrium to find.
-void requireHeld(const Scene &scene) {
-  for (std::size_t r = 0; r < scene.rods.size(); ++r) {
-    const bool held = std::any_of(scene.supports.begin(), scene.supports.end(),
-                                  [&](const Support &s) { return s.rod == int(r) && s.holdsPosition(); });
-    if (!held)
-      throw SceneError("rod '" + scene.rods[r].name +
-                       "' is free to move as a whole: -mode static needs a clamp or pins that hold every rod");
-  }
-}
-
-/// A scene ready to run; and as written, when it may have to be drawn again.
-struct Prepared {
-  std::unique_ptr<Simulation> run;
-  SceneSource source;
-  std::vector<std::string> notes;
-  Scene written;
-  std::vector<Drawing> drawings;
-};
-
-PetscErrorCode makeReady(Scene scene, const Options &o, std::unique_ptr<Simulation> &run) {
-  PetscFunctionBeginUser;
-  run = std::make_unique<Simulation>();
-  PetscCall(run->setUp(std::move(scene), o.loop));
-  PetscCall(run->solver.rehearse(run->state, TimeLoop::stepOf(o.loop, run->state, o.loop.dt)));
-  PetscFunctionReturn(0);
-}
-
-void redrawAsAsked(SceneFile &file, const Options &o) {
-  const std::vector<int> edges = edgesAsked(file.scene, o);
-  try {
-    file.scene = redraw(file.scene, file.drawings, edges);
-  } catch (const SceneError &e) {
-    throw SceneError(std::string("option -rod_edges: ") + e.what());
-  }
-}
-
-PetscErrorCode setUp(Prepared &prepared, Options &o) {
-  PetscFunctionBeginUser;
-  PetscCall(PetscLogStagePush(events().setup));
-  SceneFile file = readScene(o.scene, o.overrides);
-  prepared.source = std::move(file.source);
-  prepared.notes = std::move(file.notes);
-  if (o.gravity) file.scene.gravity = *o.gravity;
-  resolve(file.run, o);
-  if (!o.loop.dynamic) requireHeld(file.scene);
-  if (o.loop.dynamic && !file.scene.rotation.angular_velocity.isZero(0))
-    throw SceneError("scene key 'rotation': is for -mode static, a scene at rest in a frame that turns; in dynamics "
-                     "let supports turn by their motion");
-  if (o.bifurcation && o.loop.bifurcation != Bifurcation::off && !file.scene.moments.empty())
-    throw SceneError(
-        "option -bifurcation: a scene with couples has no potential whose Hessian could tell stability; use off");
-  if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength) requireDeadLoads(file.scene);
-  if (o.accuracy && o.accuracy->of == Quantity::tip)
-    for (const Rod &rod : file.scene.rods)
-      if (rod.closed)
-        throw SceneError("option -accuracy_of: rod '" + rod.name + "' is closed and has no tip; use position");
-  if (o.accuracy || (o.error_estimate && !o.loop.dynamic)) {
-    prepared.written = file.scene;
-    prepared.drawings = file.drawings;
-    if (o.accuracy) grade(prepared.written, prepared.drawings);
-  }
-  if (!o.rod_edges.empty()) redrawAsAsked(file, o);
-  PetscCall(makeReady(std::move(file.scene), o, prepared.run));
-  PetscCall(PetscLogStagePop());
-  PetscFunctionReturn(0);
-}
-
-/// Chooses the edges, and in dynamics the steps, and makes the scene ready to run with them.
-PetscErrorCode meetAccuracy(Prepared &prepared, Options &o, Choice *choice) {
-  PetscFunctionBeginUser;
-  watch().tell = [](const std::string &line) {
-    std::printf("%s\n", printable(line).c_str());
-    std::fflush(stdout);
-  };
-  choice->tell = [](const std::string &line) {
-    watch().tell(line);
-    watch().restart();
-  };
-  PetscCall(chooseResolution(prepared.written, prepared.drawings, o.loop, *o.accuracy, choice));
-  o.loop = choice->loop;
-  PetscCall(makeReady(redraw(prepared.written, prepared.drawings, choice->edges), o, prepared.run));
-  PetscFunctionReturn(0);
 }
 
 /// The error of a static answer, told and written.
@@ -238,76 +76,6 @@ std::string textOf(const SceneSource &source) {
   std::string text = source.text;
   for (const auto &[path, content] : source.files) text += '\0' + path + '\0' + content;
   return text;
-}
-
-bool isInside(const std::string &file, const std::string &folder) {
-  std::error_code none;
-  const std::filesystem::path whole = std::filesystem::weakly_canonical(file, none),
-                              top = std::filesystem::weakly_canonical(folder, none);
-  return std::mismatch(top.begin(), top.end(), whole.begin(), whole.end()).first == top.end();
-}
-
-/// Takes up the checkpoint that -restart asks for and makes room for the results. False where the run was complete
-/// already.
-bool takeUp(const Options &o, const OutputFolder &folder, const RunFacts &facts, Simulation &run, StepControl *control,
-            std::vector<std::string> *told) {
-  const bool automatic = o.restart == "auto";
-  std::string from;
-  bool changed = false;
-  if (!o.restart.empty() && !o.loop.dynamic && o.loop.continuation == Continuation::arclength)
-    throw SceneError("option -restart: -continuation arclength cannot be taken up again");
-  if (automatic && o.restart_time)
-    throw SceneError("option -restart_time: -restart auto goes on at the time of its checkpoint");
-  if (automatic) {
-    for (const std::string &path : folder.checkpoints()) {
-      try {
-        changed = readCheckpoint(path, &run, control, facts, told);
-        from = path;
-        break;
-      } catch (const DamagedCheckpoint &e) {
-        told->push_back("passed over: " + std::string(e.what()));
-      }
-    }
-    if (from.empty() && !told->empty())
-      throw SceneError("option -restart: no checkpoint in '" + o.output_dir + "' is whole (" + told->front() +
-                       "); to run from the start, without those results, take '-restart auto' away");
-    if (from.empty()) told->push_back("-restart auto: no checkpoint in " + o.output_dir + ", from the start");
-  } else if (!o.restart.empty()) {
-    from = std::filesystem::is_directory(o.restart) ? (std::filesystem::path(o.restart) / "checkpoint.h5").string()
-                                                    : o.restart;
-    changed = readCheckpoint(from, &run, control, facts, told);
-    if (isInside(from, o.output_dir))
-      throw SceneError("option -restart: the results would replace those beside the checkpoint '" + from +
-                       "'; choose another -output_dir, or write -restart auto");
-    if (o.restart_time) run.state.time = *o.restart_time;
-  }
-  if (!from.empty() && !(run.state.time < o.loop.t_end)) {
-    if (changed && !o.loop.dynamic) {
-      run.state.time = 0;
-      *control = {};
-      told->push_back("the load factor begins anew at 0");
-    } else if (automatic && !changed) {
-      std::printf("complete already: %s is at the end, nothing is left to do\n", from.c_str());
-      return false;
-    } else {
-      std::ostringstream time;
-      time << run.state.time;
-      throw SceneError("option -restart: the checkpoint is at " +
-                       std::string(o.loop.dynamic ? "time " : "load factor ") + time.str() + ", nothing is left to do" +
-                       (o.loop.dynamic ? "; write a larger -t_end, or another -restart_time" : ""));
-    }
-  }
-  if (from.empty() || !automatic) {
-    std::string names;
-    for (const std::string &name : folder.clear()) names += (names.empty() ? "" : ", ") + name;
-    if (!names.empty()) told->push_back("removed from " + o.output_dir + ", of an earlier run: " + names);
-  } else
-    from = folder.setAside(from);
-  if (from.empty()) return true;
-  std::ostringstream line;
-  line << "goes on from " << from << " at " << (o.loop.dynamic ? "time " : "load factor ") << run.state.time;
-  told->insert(told->begin(), line.str());
-  return true;
 }
 
 /// The rod of the largest kinetic energy.
@@ -349,7 +117,7 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   Prepared prepared;
   {
     const QuietErrors errors;
-    if (setUp(prepared, o)) throw SceneError("setting up the solvers: " + errors.message());
+    if (prepare(prepared, o)) throw SceneError("setting up the solvers: " + errors.message());
   }
   if (o.help) PetscFunctionReturn(0);
   PetscCall(refuseUnknownOptions());

@@ -1,0 +1,90 @@
+#include "tendril/io/prepare.hpp"
+
+#include "tendril/dynamics/arc_length.hpp"
+#include "tendril/io/text.hpp"
+#include "tendril/solver/activity.hpp"
+#include "tendril/solver/events.hpp"
+
+#include <algorithm>
+
+namespace tendril {
+namespace {
+
+/// A rod that nothing holds has no equilibrium to find.
+void requireHeld(const Scene &scene) {
+  for (std::size_t r = 0; r < scene.rods.size(); ++r) {
+    const bool held = std::any_of(scene.supports.begin(), scene.supports.end(),
+                                  [&](const Support &s) { return s.rod == int(r) && s.holdsPosition(); });
+    if (!held)
+      throw SceneError("rod '" + scene.rods[r].name +
+                       "' is free to move as a whole: -mode static needs a clamp or pins that hold every rod");
+  }
+}
+
+PetscErrorCode makeReady(Scene scene, const Options &o, std::unique_ptr<Simulation> &run) {
+  PetscFunctionBeginUser;
+  run = std::make_unique<Simulation>();
+  PetscCall(run->setUp(std::move(scene), o.loop));
+  PetscCall(run->solver.rehearse(run->state, TimeLoop::stepOf(o.loop, run->state, o.loop.dt)));
+  PetscFunctionReturn(0);
+}
+
+void redrawAsAsked(SceneFile &file, const Options &o) {
+  const std::vector<int> edges = edgesAsked(file.scene, o);
+  try {
+    file.scene = redraw(file.scene, file.drawings, edges);
+  } catch (const SceneError &e) {
+    throw SceneError(std::string("option -rod_edges: ") + e.what());
+  }
+}
+
+} // namespace
+
+PetscErrorCode prepare(Prepared &prepared, Options &o) {
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogStagePush(events().setup));
+  SceneFile file = readScene(o.scene, o.overrides);
+  prepared.source = std::move(file.source);
+  prepared.notes = std::move(file.notes);
+  if (o.gravity) file.scene.gravity = *o.gravity;
+  resolve(file.run, o);
+  if (!o.loop.dynamic) requireHeld(file.scene);
+  if (o.loop.dynamic && !file.scene.rotation.angular_velocity.isZero(0))
+    throw SceneError("scene key 'rotation': is for -mode static, a scene at rest in a frame that turns; in dynamics "
+                     "let supports turn by their motion");
+  if (o.bifurcation && o.loop.bifurcation != Bifurcation::off && !file.scene.moments.empty())
+    throw SceneError(
+        "option -bifurcation: a scene with couples has no potential whose Hessian could tell stability; use off");
+  if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength) requireDeadLoads(file.scene);
+  if (o.accuracy && o.accuracy->of == Quantity::tip)
+    for (const Rod &rod : file.scene.rods)
+      if (rod.closed)
+        throw SceneError("option -accuracy_of: rod '" + rod.name + "' is closed and has no tip; use position");
+  if (o.accuracy || (o.error_estimate && !o.loop.dynamic)) {
+    prepared.written = file.scene;
+    prepared.drawings = file.drawings;
+    if (o.accuracy) grade(prepared.written, prepared.drawings);
+  }
+  if (!o.rod_edges.empty()) redrawAsAsked(file, o);
+  PetscCall(makeReady(std::move(file.scene), o, prepared.run));
+  PetscCall(PetscLogStagePop());
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode meetAccuracy(Prepared &prepared, Options &o, Choice *choice) {
+  PetscFunctionBeginUser;
+  watch().tell = [](const std::string &line) {
+    std::printf("%s\n", printable(line).c_str());
+    std::fflush(stdout);
+  };
+  choice->tell = [](const std::string &line) {
+    watch().tell(line);
+    watch().restart();
+  };
+  PetscCall(chooseResolution(prepared.written, prepared.drawings, o.loop, *o.accuracy, choice));
+  o.loop = choice->loop;
+  PetscCall(makeReady(redraw(prepared.written, prepared.drawings, choice->edges), o, prepared.run));
+  PetscFunctionReturn(0);
+}
+
+} // namespace tendril

@@ -1,0 +1,164 @@
+#include "tendril/io/support_reader.hpp"
+
+#include <algorithm>
+#include <sstream>
+
+namespace tendril {
+
+Vec3 unit(const YamlValue &value) {
+  const Vec3 v = value.vector();
+  if (v.norm() == 0) value.fail("'" + value.name() + "' must not be zero");
+  return v.normalized();
+}
+
+namespace {
+
+/// Rods a support or load speaks of: a name, a number, or `all`.
+std::vector<int> readTargets(YamlMap &map, KeyOf<KeyType::rod> key, const std::vector<Rod> &rods) {
+  if (!map.has(*key)) {
+    if (rods.size() > 1) map.value().fail("say which 'rod' is meant: a name, a number from 0, or all");
+    return {0};
+  }
+  const YamlValue v = map.at(*key);
+  const std::string word = v.text();
+  const std::vector<int> found = rodsOf(rods, word);
+  if (found.empty())
+    v.fail("there is no rod '" + word + "'; write the name of a rod, its number from 0 to " +
+           std::to_string(rods.size() - 1) + ", or all");
+  return found;
+}
+
+int readIndex(YamlMap &map, KeyOf<KeyType::index> key, int count, const std::string &rod) {
+  const YamlValue v = map.at(*key);
+  if (v.isScalar() && v.node().Scalar() == "last") return count - 1;
+  const int i = v.integer(*key);
+  if (i >= count)
+    v.fail("'" + v.name() + "' " + std::to_string(i) + " is out of range: rod '" + rod + "' has " +
+           std::to_string(count) + ", numbered 0 to " + std::to_string(count - 1));
+  return i;
+}
+
+Motion readMotion(const YamlValue &value) {
+  YamlMap map(value, "supports[].motion");
+  Motion m;
+  m.velocity = map.vector("supports[].motion.velocity");
+  m.angular_velocity = map.vector("supports[].motion.angular_velocity");
+  const bool steady = map.has("supports[].motion.velocity") || map.has("supports[].motion.angular_velocity"),
+             table = map.has("supports[].motion.table");
+  if (!steady && !table) value.fail("'motion' needs 'velocity' and/or 'angular_velocity', or a 'table'");
+  if (table) {
+    if (steady) value.fail("'motion' takes a 'table' or velocities, not both");
+    for (const YamlValue &row : map.at("supports[].motion.table").items()) {
+      const std::size_t n = row.node().size();
+      if (n != 4 && n != 7) row.fail("a row of 'table' is [time, dx, dy, dz] or [time, dx, dy, dz, rx, ry, rz]");
+      const std::vector<double> v = row.numbers(n);
+      m.table.push_back({v[0], Vec3(v[1], v[2], v[3]), n == 7 ? Vec3(v[4], v[5], v[6]) : Vec3(Vec3::Zero())});
+      if (m.table.size() > 1 && m.table[m.table.size() - 2].time >= v[0])
+        row.fail("the times of 'table' must increase, found " + std::to_string(v[0]) + " after " +
+                 std::to_string(m.table[m.table.size() - 2].time));
+    }
+    if (m.table.empty()) value.fail("'table' is empty");
+  }
+  map.finish();
+  return m;
+}
+
+/// A motion that is elsewhere at the start than the rod as drawn.
+std::string jumpOf(const Motion &motion, const std::string &rod) {
+  const double away = motion.displacementAt(0).norm(), turned = motion.rotationVectorAt(0).norm();
+  if (away == 0 && turned == 0) return {};
+  std::ostringstream s;
+  s << "the motion begins " << away << " m and " << turned << " rad away from rod '" << rod
+    << "' as drawn, which jumps there in the first step";
+  return s.str();
+}
+
+} // namespace
+
+void readSupport(const YamlValue &value, SceneFile &out) {
+  Scene &scene = out.scene;
+  YamlMap map(value, "supports");
+  bool warned = false;
+  const std::string type = map.word("supports[].type");
+  for (const int r : readTargets(map, "supports[].rod", scene.rods)) {
+    const Rod &rod = scene.rods[r];
+    Support s{};
+    s.kind = type == "clamp" ? Support::Kind::clamp : type == "pin" ? Support::Kind::pin : Support::Kind::fix_twist;
+    s.rod = r;
+    s.vertex = readIndex(map, "supports[].vertex", rod.vertices(), rod.name);
+    for (const Support &other : scene.supports)
+      if (other.rod == r && other.vertex == s.vertex &&
+          ((other.holdsPosition() && s.holdsPosition()) || (other.holdsTwist() && s.holdsTwist())))
+        value.fail("vertex " + std::to_string(s.vertex) + " of rod '" + rod.name + "' is held twice");
+    s.frame = frameAtVertex(rod, s.vertex);
+    if (type != "pin") {
+      s.tangent_given = map.has("supports[].tangent");
+      s.director_given = map.has("supports[].director");
+      if (s.tangent_given) s.frame.tangent = unit(map.at("supports[].tangent"));
+      s.frame.director = orthonormalised(s.frame.director, s.frame.tangent);
+      if (s.director_given) {
+        const YamlValue d = map.at("supports[].director");
+        const Vec3 v = unit(d);
+        if (std::abs(v.dot(s.frame.tangent)) > 1e-6) d.fail("'director' is not normal to the tangent of the support");
+        s.frame.director = v;
+      }
+      for (const int edge : {rod.edgeBefore(s.vertex), rod.edgeAfter(s.vertex)})
+        if (type == "clamp" && edge >= 0 && s.frame.tangent.dot(rod.edge(edge).normalized()) < -0.9999)
+          map.at("supports[].tangent")
+              .fail("'tangent' points against edge " + std::to_string(edge) + " of rod '" + rod.name +
+                    "', which would fold back on itself; tangents point from vertex to vertex, by their numbers");
+      if (!s.frame.director.allFinite())
+        value.fail("'tangent' is parallel to the rod's director; give a 'director' too");
+    }
+    if (type == "fix_twist" && rod.material.isCable())
+      value.fail("rod '" + rod.name + "' has no flexural stiffness and no twist to fix");
+    if (map.has("supports[].motion")) {
+      const YamlValue motion = map.at("supports[].motion");
+      s.motion = readMotion(motion);
+      const auto turns = [](const Motion::Key &k) { return !k.rotation.isZero(0); };
+      const auto travels = [](const Motion::Key &k) { return !k.displacement.isZero(0); };
+      const auto &table = s.motion.table;
+      if (type == "pin" && (!s.motion.angular_velocity.isZero(0) || std::any_of(table.begin(), table.end(), turns)))
+        motion.fail("a pin holds no rotation; take it away or write 'type: clamp'");
+      if (type == "fix_twist" && (!s.motion.velocity.isZero(0) || std::any_of(table.begin(), table.end(), travels)))
+        motion.fail("fix_twist holds no position; take the displacement away or add a pin that moves");
+    }
+    if (const std::string jump = jumpOf(s.motion, rod.name); !jump.empty() && !warned) {
+      out.notes.push_back("warning: " + value.place() + ": " + jump);
+      warned = true;
+    }
+    scene.supports.push_back(s);
+  }
+  map.finish();
+}
+
+void readLoad(const YamlValue &value, SceneFile &out) {
+  Scene &scene = out.scene;
+  YamlMap map(value, "loads");
+  bool warned = false;
+  for (const int r : readTargets(map, "loads[].rod", scene.rods)) {
+    const Rod &rod = scene.rods[r];
+    if (map.has("loads[].force")) {
+      const NodalForce &load = scene.forces.emplace_back(r, readIndex(map, "loads[].vertex", rod.vertices(), rod.name),
+                                                         map.vector("loads[].force"));
+      const bool held = std::any_of(scene.supports.begin(), scene.supports.end(), [&](const Support &s) {
+        return s.rod == r && s.vertex == load.vertex && s.holdsPosition();
+      });
+      if (held && !warned && !load.force.isZero(0))
+        out.notes.push_back("warning: " + value.place() + ": the force acts on vertex " + std::to_string(load.vertex) +
+                            " of rod '" + rod.name + "', which a support holds: it moves nothing");
+      warned = warned || held;
+    } else if (map.has("loads[].torque") || map.has("loads[].moment")) {
+      if (rod.material.isCable())
+        value.fail("rod '" + rod.name + "' has no flexural stiffness: it cannot carry a torque or moment");
+      EdgeMoment m{r, readIndex(map, "loads[].edge", rod.edges(), rod.name), 0, Vec3::Zero()};
+      if (map.has("loads[].torque")) m.torque = map.number("loads[].torque");
+      if (map.has("loads[].moment")) m.moment = map.vector("loads[].moment");
+      scene.moments.push_back(m);
+    } else
+      value.fail("a load needs 'vertex' and 'force', or 'edge' and 'torque' or 'moment'");
+  }
+  map.finish();
+}
+
+} // namespace tendril
