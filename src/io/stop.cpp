@@ -1,16 +1,28 @@
 #include "tendril/io/stop.hpp"
 
+#include <ctime>
 #include <unistd.h>
 
 namespace tendril {
 namespace {
 
 volatile std::sig_atomic_t caught = 0;
+timespec first; ///< when the signal that asked to stop came
 
+/// One request may come as two signals: `timeout` sends its own to the process and to its group.
 extern "C" void catchSignal(int signal) {
+  constexpr double same_request = 0.5; // [s]
   constexpr char text[] = "\ntendril: finishing the step; once more ends the run at once\n";
-  caught = signal;
-  (void)!write(STDERR_FILENO, text, sizeof text - 1);
+  timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  if (caught == 0) {
+    first = now;
+    caught = signal;
+    (void)!write(STDERR_FILENO, text, sizeof text - 1);
+  } else if (double(now.tv_sec - first.tv_sec) + 1e-9 * double(now.tv_nsec - first.tv_nsec) > same_request) {
+    std::signal(signal, SIG_DFL);
+    std::raise(signal);
+  }
 }
 
 } // namespace
@@ -33,14 +45,16 @@ StopRequest::StopRequest(Clock::time_point begin, std::optional<double> limit) :
     sigaction(signal, nullptr, &before);
     if (before.sa_handler == SIG_IGN) continue; // as nohup and shells ask for
     now.sa_handler = catchSignal;
-    now.sa_flags = int(SA_RESETHAND | SA_RESTART);
+    now.sa_flags = SA_RESTART;
     sigemptyset(&now.sa_mask);
+    for (const int other : {SIGINT, SIGTERM}) sigaddset(&now.sa_mask, other); // one at a time
     sigaction(signal, &now, nullptr);
     before_.emplace_back(signal, before);
   }
 }
 
 StopRequest::~StopRequest() {
+  if (caught != 0) return; // the rest of a request that came as two signals must not end what writes files
   for (const auto &[signal, action] : before_) sigaction(signal, &action, nullptr);
 }
 

@@ -300,6 +300,24 @@ def signals(tmp):
         if end:
             run(0, *base, "-t_end", 2, "-restart", "auto", says="goes on from")
             same(final(tmp + "/whole"), final(out))
+    # One request may come as two signals, as `timeout` sends them; half a second later another one ends the run at once, in the middle of a step.
+    process = started(*base, "-t_end", 1000)
+    until(lambda: " 1000" in logOf(out) and "time " in logOf(out), process)
+    for _ in range(3):
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.001)
+    text = process.communicate()[0]
+    assert process.returncode == 130 and "stopped by SIGINT" in text, (process.returncode, text)
+    write(tmp + "/long.yaml", "simulation: {mode: static}\nrods: [{line: {from: [0, 0, 0], to: [1, 0, 0], edges: 1000000}, material: {radius: 0.01, young: 1e7,"
+          " poisson: 0.3, density: 1000}}]\nsupports: [{vertex: 0, type: clamp}]\n")
+    process = started("-scene", tmp + "/long.yaml", "-output_dir", tmp + "/long")
+    until(lambda: os.path.exists(tmp + "/long/trajectory.h5"), process)
+    time.sleep(0.3)
+    process.send_signal(signal.SIGINT)
+    time.sleep(0.7)
+    process.send_signal(signal.SIGINT)
+    text = process.communicate()[0]
+    assert process.returncode == -signal.SIGINT and "once more ends the run" in text, (process.returncode, text)
     run(75, *base, "-t_end", 1000, "-time_limit", 0.7, says=["stopped by -time_limit at time", "-restart auto"])
     assert os.path.exists(out + "/checkpoint.h5")
     run(75, "-scene", source + "/data/scenes/elastica.yaml", "-mode", "static", "-load_steps", 100000, "-output_dir", tmp + "/static", "-time_limit", 1e-3, says="at load factor")

@@ -21,7 +21,8 @@ private:
   std::vector<std::pair<int, struct sigaction>> before_;
 };
 
-/// While it lives, the first SIGINT or SIGTERM only asks the run to stop; the second ends it. Signals that were ignored
+/// While it lives, the first SIGINT or SIGTERM only asks the run to stop; another, half a second later or
+/// more, ends it. Signals that were ignored
 /// stay so.
 class StopRequest {
 public:
