@@ -38,6 +38,9 @@ bool takeUp(const Options &o, const OutputFolder &folder, const RunFacts &facts,
   } else if (!o.restart.empty()) {
     from = std::filesystem::is_directory(o.restart) ? (std::filesystem::path(o.restart) / "checkpoint.h5").string()
                                                     : o.restart;
+    if (!std::filesystem::exists(from))
+      throw SceneError("option -restart: there is no checkpoint '" + from +
+                       "'; give that of a run, or its output folder");
     changed = readCheckpoint(from, &run, control, facts, told);
     if (isInside(from, o.output_dir))
       throw SceneError("option -restart: the results would replace those beside the checkpoint '" + from +

@@ -23,6 +23,14 @@ int characterLength(const std::string &text, std::size_t at) {
   return control || longer || surrogate || beyond ? 0 : length;
 }
 
+/// Characters that turn the order of others around them (UAX 9: U+202A to U+202E, U+2066 to U+2069): lines would show
+/// what they do not say.
+bool reorders(const std::string &text, std::size_t at) {
+  const std::string head = text.substr(at, 2);
+  const unsigned last = at + 2 < text.size() ? static_cast<unsigned char>(text[at + 2]) : 0u;
+  return (head == "\xE2\x80" && last >= 0xAA && last <= 0xAE) || (head == "\xE2\x81" && last >= 0xA6 && last <= 0xA9);
+}
+
 std::string inHex(char c) {
   constexpr const char *digits = "0123456789ABCDEF";
   const auto byte = static_cast<unsigned char>(c);
@@ -65,7 +73,7 @@ std::string readText(const std::string &path, const std::string &missing) {
 std::string printable(const std::string &text) {
   std::string out;
   for (std::size_t k = 0; k < text.size();) {
-    const int length = characterLength(text, k);
+    const int length = reorders(text, k) ? 0 : characterLength(text, k);
     if (length == 0)
       out += "\\x" + inHex(text[k]);
     else

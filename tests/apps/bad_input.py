@@ -176,7 +176,7 @@ rows = [
     ("word that PETSc has for a switch", None, ["-on_error_abort", "maybe"], ["option -on_error_abort: command line", "maybe"]),
     ("limit that is a word", None, ["-snes_max_it", "abc"], ["-snes_max_it", "'abc' is not a number"]),
     ("tolerance that is a word", None, ["-snes_rtol", "abc"], ["-snes_rtol", "abc"]),
-    ("no checkpoint", None, ["-restart", "nowhere.h5"], ["nowhere.h5", "not a readable HDF5 file"]),
+    ("no checkpoint", None, ["-restart", "nowhere.h5"], ["-restart", "there is no checkpoint 'nowhere.h5'"]),
     ("checkpoint of nothing", None, ["-restart", "file"], ["file", "not a readable HDF5 file"]),
     ("half a checkpoint interval", None, ["-checkpoint_interval", "0.5"], ["-checkpoint_interval", "whole number"]),
     ("unwritable folder", None, ["-output_dir", "file/out"], ["-output_dir", "cannot be written"]),
