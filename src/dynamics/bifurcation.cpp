@@ -83,9 +83,7 @@ PetscErrorCode criticalMode(StepSolver &solver, const CriticalPoint &point, Step
   PetscFunctionReturn(0);
 }
 
-/// Whether two points may be of one branch: before a limit point a rod moves by the root of the interval; beyond it,
-/// Newton jumps.
-static bool areNear(const BranchPoint &a, const BranchPoint &b, double width) {
+bool areNear(const BranchPoint &a, const BranchPoint &b, double width) {
   return distanceBetween(a.state, b.state) <= std::sqrt(std::abs(a.parameter - b.parameter) / width);
 }
 

@@ -79,9 +79,7 @@ PetscErrorCode TimeLoop::locateNext(const State &start, const Step &step, Critic
     if (!to->found) PetscFunctionReturn(0);
     PetscCall(countUnstable(solver_, &to->unstable));
     solver_.potential().commit(to->state);
-    // Before a limit point a rod moves by the root of the interval; beyond it, Newton jumps.
-    to->found = to->unstable >= 0 &&
-                distanceBetween(from.state, to->state) <= std::sqrt(std::abs(factor - from.parameter) / width);
+    to->found = to->unstable >= 0 && areNear(from, *to, width);
     PetscFunctionReturn(0);
   };
   BranchPoint low;

@@ -117,8 +117,7 @@ private:
         value = std::stod(word, &used);
       } catch (const std::exception &) {}
       if (used == 0 || used != word.size()) fail(key, "'" + word + "' is not a number");
-      if (!std::isfinite(value)) fail(key, "must be finite, found '" + word + "'");
-      if (!isOfAnySize(value)) fail(key, "must be 0 or of a size between 1e-100 and 1e100, found '" + word + "'");
+      if (const std::string wrong = unfitNumber(value); !wrong.empty()) fail(key, wrong + ", found '" + word + "'");
       values.push_back(value);
     }
     return values;

@@ -134,9 +134,8 @@ double YamlValue::number() const {
   double value;
   if (!node_.IsScalar() || !YAML::convert<double>::decode(node_, value))
     fail("'" + name_ + "' must be a number, found " + describe(node_));
-  if (!std::isfinite(value)) fail("'" + name_ + "' must be finite, found " + describe(node_));
-  if (!isOfAnySize(value))
-    fail("'" + name_ + "' must be 0 or of a size between 1e-100 and 1e100, found " + describe(node_));
+  if (const std::string wrong = unfitNumber(value); !wrong.empty())
+    fail("'" + name_ + "' " + wrong + ", found " + describe(node_));
   return value;
 }
 
@@ -279,7 +278,11 @@ void YamlMap::finish() const {
   }
 }
 
-bool isOfAnySize(double value) { return value == 0 || (std::abs(value) >= 1e-100 && std::abs(value) <= 1e100); }
+std::string unfitNumber(double value) {
+  if (!std::isfinite(value)) return "must be finite";
+  const double size = std::abs(value);
+  return size == 0 || (size >= 1e-100 && size <= 1e100) ? "" : "must be 0 or of a size between 1e-100 and 1e100";
+}
 
 std::string outOfBounds(const Key &key, double value) {
   auto text = [](double bound) {

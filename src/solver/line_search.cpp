@@ -129,15 +129,6 @@ bool NewtonSolver::searchRod(int r, double *lambda) {
   return true;
 }
 
-PetscErrorCode NewtonSolver::keepGradient(Vec f, std::vector<double> *kept) {
-  const double *values;
-  PetscFunctionBeginUser;
-  PetscCall(VecGetArrayRead(f, &values));
-  kept->assign(values, values + potential_->dofs().unknowns(rods_));
-  PetscCall(VecRestoreArrayRead(f, &values));
-  PetscFunctionReturn(0);
-}
-
 PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   Vec x, f, y;
   PetscBool changed;
@@ -151,7 +142,7 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
   bool accepted = true;
   std::vector<double> before; // the gradient, where secants are wanted
   if (potential_->settings.quasi_newton > 1) {
-    PetscCall(keepGradient(f, &before));
+    PetscCall(copyValues(f, &before));
     lengths_.assign(rods_.end - rods_.begin, 0.0);
   }
   for (int r = rods_.begin; r < rods_.end && accepted; ++r) {

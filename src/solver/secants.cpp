@@ -4,6 +4,17 @@
 
 namespace tendril {
 
+PetscErrorCode copyValues(Vec from, std::vector<double> *values) {
+  const double *read;
+  PetscInt count;
+  PetscFunctionBeginUser;
+  PetscCall(VecGetLocalSize(from, &count));
+  PetscCall(VecGetArrayRead(from, &read));
+  values->assign(read, read + count);
+  PetscCall(VecRestoreArrayRead(from, &read));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode Secants::apply(const DofMap &dofs, RodSet rods, const std::function<PetscErrorCode(Vec, Vec)> &solve,
                               Vec f, Vec work, Vec y) const {
   PetscFunctionBeginUser;
@@ -44,13 +55,8 @@ PetscErrorCode Secants::add(const DofMap &dofs, RodSet rods, Vec direction, cons
                             const std::vector<double> &before, Vec f) {
   PetscFunctionBeginUser;
   Pair secant;
-  const double *values;
-  PetscCall(VecGetArrayRead(direction, &values));
-  secant.step.assign(values, values + before.size());
-  PetscCall(VecRestoreArrayRead(direction, &values));
-  PetscCall(VecGetArrayRead(f, &values));
-  secant.change.assign(values, values + before.size());
-  PetscCall(VecRestoreArrayRead(f, &values));
+  PetscCall(copyValues(direction, &secant.step));
+  PetscCall(copyValues(f, &secant.change));
   for (std::size_t i = 0; i < before.size(); ++i) secant.change[i] -= before[i];
   for (int r = rods.begin; r < rods.end; ++r) {
     const PetscInt begin = dofs.firstUnknown({r, r + 1}) - dofs.firstUnknown(rods),

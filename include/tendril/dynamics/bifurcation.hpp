@@ -17,6 +17,11 @@ struct BranchPoint {
   bool found = false;   ///< whether Newton came to one, and near
 };
 
+/// Whether two points may be of one branch: before a limit point a rod moves by the root of the interval; beyond it,
+/// Newton jumps.
+/// \param width of the interval that is searched
+bool areNear(const BranchPoint &a, const BranchPoint &b, double width);
+
 struct CriticalPoint {
   double load_factor = 0;
   std::optional<State> state; ///< equilibrium there

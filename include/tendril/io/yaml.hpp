@@ -83,8 +83,8 @@ private:
   std::string named(const Key &key);
 };
 
-/// Whether squares and products of a number stay numbers: it is 0, or between 1e-100 and 1e100 in size.
-bool isOfAnySize(double value);
+/// Why a number cannot be computed with, as "must be finite": squares and products of numbers have to stay numbers.
+std::string unfitNumber(double value);
 /// What is wrong with a number by the bounds of its key, or an empty string.
 std::string outOfBounds(const Key &key, double value);
 

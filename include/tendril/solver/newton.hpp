@@ -173,7 +173,6 @@ private:
   double firstShift(int rod) const;
   PetscErrorCode includeMotion(Vec y);
   PetscErrorCode includeCirculation(bool *regular);
-  PetscErrorCode keepGradient(Vec f, std::vector<double> *values);
   bool searchRod(int rod, double *lambda);
   bool residualFalls(int rod, double length, const IncrementalPotential::RodEnergy &trial);
   bool sharesFactor() const;

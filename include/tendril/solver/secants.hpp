@@ -9,6 +9,9 @@
 
 namespace tendril {
 
+/// All values of a vector of this process.
+PetscErrorCode copyValues(Vec from, std::vector<double> *values);
+
 class Secants {
 public:
   void clear() { pairs_.clear(); }
