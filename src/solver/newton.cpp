@@ -244,7 +244,8 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
   PetscCall(writeIterate(x_));
   // From a saddle the way down may be long, and shorter load steps begin at the same one; of fine rods they are still
   // the cheaper way.
-  int limits = report_.escapes > 0 && patience_ == 0 && potential_->elements().edges() <= most_searched_edges
+  int limits = report_.escapes > 0 && seek_ == Seek::minimum && patience_ == 0 &&
+                       potential_->elements().edges() <= most_searched_edges
                    ? limits_from_saddle
                    : 1;
   do {
@@ -292,6 +293,7 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
   report_ = {};
   seek_ = seek;
   follows_ = seek == Seek::equilibrium;
+  descends_ = false;
   patience_ = patience;
   sharpness_ = 1;
   likely_ = spent_ = 0;
@@ -353,6 +355,7 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
       PetscCall(settle(seek_));
       continue;
     }
+    const bool creeps = creeps_;
     bool left = false, neutral = false;
     const std::string unstable = unstableRod();
     if (negative > 0 && k < 10) PetscCall(escapeSaddle(&left, &neutral));
@@ -361,7 +364,16 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
       report_.zero_pivots += std::max(0, negative);
       report_.negative_pivots = 0;
       if (k == 0) report_.first_negative_pivots = 0;
+      const Configuration here = potential_->iterate();
       PetscCall(settle(Seek::equilibrium)); // Newton's own steps: a shift would drown the soft direction
+      if (failure.empty() || report_.lost || !creeps) continue;
+      // The way down that was crept along is there, if too flat for its curvature to be told from rounding.
+      for (int r = rods_.begin; r < rods_.end; ++r) potential_->accept(here, r);
+      forgetEnergies();
+      seek_ = seek;
+      descends_ = true;
+      PetscCall(newton(&failure));
+      descends_ = false;
       continue;
     }
     seek_ = seek;

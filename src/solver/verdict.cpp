@@ -109,7 +109,8 @@ NewtonSolver::Verdict NewtonSolver::judge(int r, double rtol) {
     standstill.best = std::min(now, standstill.best);
     if (falls) standstill.iterations = 0;
     standstill.creeping = falls || !standstill.tiny ? 0 : standstill.creeping + 1;
-    return potential_->step().isStatic() && standstill.creeping >= patience ? Verdict::saddle : Verdict::going;
+    return potential_->step().isStatic() && !descends_ && standstill.creeping >= patience ? Verdict::saddle
+                                                                                          : Verdict::going;
   }
   double size;
   const bool little = isLittle(r, &size);

@@ -155,9 +155,10 @@ private:
   std::vector<double> lengths_;     ///< of the last step, per rod
   int age_ = 0;                     ///< iterations that the factorisation has served
   bool fresh_ = true, renew_ = false;
-  double likely_ = 0;   ///< residual from which the next iterate is likely an answer
-  std::string lost_;    ///< why the last solve was lost in rounding
-  bool creeps_ = false; ///< whether the last solve ended for creeping towards a saddle
+  double likely_ = 0;     ///< residual from which the next iterate is likely an answer
+  std::string lost_;      ///< why the last solve was lost in rounding
+  bool creeps_ = false;   ///< whether the last solve ended for creeping towards a saddle
+  bool descends_ = false; ///< whether creeping goes on, for what ends it
 
   PetscErrorCode newton(std::string *failure);
   PetscErrorCode moveTo(Vec x, bool *possible);
