@@ -55,22 +55,86 @@ static void goTo(StepSolver &solver, const State &state, Step step) {
   solver.begin(state, step);
 }
 
+namespace {
+
+/// The softest motion at a point of a branch.
+struct Softest {
+  double stiffness = 0; ///< as the lift that makes it zero, of the softest bending; negative behind a critical point
+  int count = 0;        ///< negative pivots of a lift that leaves this motion out
+};
+
+} // namespace
+
+/// `stable`: negative pivots ahead of the critical point; `close`: accuracy, of the stiffness, which is never taken for
+/// smaller than it is.
+static PetscErrorCode softestMotion(StepSolver &solver, const Step &step, const BranchPoint &point, int stable,
+                                    double close, Softest *softest) {
+  constexpr double first = 1e-7, grows = 4, highest = 1e12; // of the softest bending
+  PetscFunctionBeginUser;
+  const bool ahead = point.unstable <= stable;
+  const double side = ahead ? -1 : 1;
+  softest->count = stable;
+  goTo(solver, point.state, step);
+  if (ahead) PetscCall(solver.inertiaAtIterate(&softest->count, -first)); // motions that cost nothing are counted, too
+  auto reaches = [&](double lift, bool *reached) {
+    int count;
+    PetscFunctionBeginUser;
+    PetscCall(solver.inertiaAtIterate(&count, side * lift));
+    *reached = (count > softest->count) == ahead;
+    PetscFunctionReturn(0);
+  };
+  double low = first, high = first;
+  for (bool reached = false; !reached && high < highest;) {
+    low = std::exchange(high, grows * high);
+    PetscCall(reaches(high, &reached));
+  }
+  while (high - low > close * high) {
+    const double middle = 0.5 * (low + high);
+    bool reached;
+    PetscCall(reaches(middle, &reached));
+    (reached ? high : low) = middle;
+  }
+  softest->stiffness = -side * high;
+  PetscFunctionReturn(0);
+}
+
 /// Whether a motion loses its stiffness towards a critical point: at `there`, which is much nearer to it than `before`,
 /// the softest one that is stable has a small `part` of what it has at `before`. Where Newton only fails, or jumps, or
 /// where a motion costs nothing, none does.
 static PetscErrorCode softens(StepSolver &solver, const Step &step, const BranchPoint &before, const BranchPoint &there,
                               double part, bool *softer) {
-  constexpr double first = 1e-7, grows = 4, highest = 1e12; // of the softest bending
   PetscFunctionBeginUser;
-  int softest, count; // motions that cost nothing are counted in both
-  double stiffness = first;
-  goTo(solver, before.state, step);
-  PetscCall(solver.inertiaAtIterate(&softest, -stiffness));
-  for (count = softest; count == softest && stiffness < highest;)
-    PetscCall(solver.inertiaAtIterate(&count, -(stiffness *= grows)));
+  Softest softest;
+  int count;
+  PetscCall(softestMotion(solver, step, before, before.unstable, 1, &softest));
   goTo(solver, there.state, step);
-  PetscCall(solver.inertiaAtIterate(&count, -part * stiffness));
-  *softer = count > softest;
+  PetscCall(solver.inertiaAtIterate(&count, -part * softest.stiffness));
+  *softer = count > softest.count;
+  PetscFunctionReturn(0);
+}
+
+/// The load factor of a bifurcation near `at`, between points ahead and behind. Right beside it Newton's answers are
+/// rough: what is left of forces moves the critical motion far. The stiffness of that motion is smooth, and is known
+/// better at some way; near enough for no other motion to be as soft, a straight line through it is exact to the square
+/// of the way.
+static PetscErrorCode interpolate(StepSolver &solver, const Step &step, const Follow &follow, const BranchPoint &before,
+                                  const BranchPoint &beyond, double at, double *load_factor) {
+  constexpr double rough = 0.5, close = 1e-5, small = 0.1;
+  PetscFunctionBeginUser;
+  const int stable = before.unstable;
+  Softest ahead, behind;
+  PetscCall(softestMotion(solver, step, before, stable, rough, &ahead));
+  PetscCall(softestMotion(solver, step, beyond, stable, rough, &behind));
+  const double way = small * std::min(1.0, -ahead.stiffness / behind.stiffness) *
+                     std::min(at - before.parameter, beyond.parameter - at);
+  BranchPoint low, high;
+  PetscCall(follow(before, at - way, &low));
+  PetscCall(follow(low, at + way, &high));
+  if (!low.found || !high.found || low.unstable != stable || high.unstable <= stable) PetscFunctionReturn(0);
+  PetscCall(softestMotion(solver, step, low, stable, close, &ahead));
+  PetscCall(softestMotion(solver, step, high, stable, close, &behind));
+  const double part = ahead.stiffness / (ahead.stiffness - behind.stiffness);
+  *load_factor = low.state.time + part * (high.state.time - low.state.time);
   PetscFunctionReturn(0);
 }
 
@@ -144,6 +208,8 @@ PetscErrorCode locateCritical(StepSolver &solver, const Step &step, const Follow
       }
       point->load_factor = low.state.time;
       point->limit = !ahead;
+      if (ahead && beyond.unstable > low.unstable)
+        PetscCall(interpolate(solver, step, follow, before, beyond, low.parameter, &point->load_factor));
       point->state = low.state;
       point->lost.reset();
       if (ahead) point->lost = (beyond.unstable > low.unstable ? beyond : before).state;

@@ -302,7 +302,7 @@ TEST(ArcLength, RefusesPrescribedMotionsAndScenesWithoutLoad) {
   EXPECT_THROW(requireDeadLoads(scene), SceneError);
 }
 
-constexpr double step_tolerance = 1e-7; // what two ways to a critical factor may differ by: asked for
+constexpr double step_tolerance = 1e-8; // what two ways to a critical factor may differ by: asked for
 
 Scene sceneOf(const std::string &file) {
   return readScene(std::string(TENDRIL_SOURCE_DIR) + "/data/scenes/" + file).scene;
@@ -314,13 +314,12 @@ double discreteEulerLoad(int edges) { return 2.0 * edges * edges * (1 - std::cos
 
 TEST(CriticalFactor, OfAColumnIsOneWhateverTheSteps) {
   const Scene scene = sceneOf("column.yaml");
-  const double exact = discreteEulerLoad(64) / 4;
+  const double euler = discreteEulerLoad(64), exact = euler / 4 * (1 - euler / 1e8); // compressed by the load over EA
   for (const int steps : {1, 2, 3, 5, 7, 10, 13, 20, 40, 80, 160}) {
     const Path path = follow(scene, statics(steps));
     ASSERT_EQ(path.critical.size(), 1u) << steps;
     EXPECT_FALSE(path.critical[0].limit) << steps;
-    EXPECT_NEAR(path.critical[0].load_factor, exact, step_tolerance * exact)
-        << steps; // F/EA = 2.5e-8 of it is not in the exact value
+    EXPECT_NEAR(path.critical[0].load_factor, exact, step_tolerance * exact) << steps;
   }
 }
 
@@ -340,6 +339,21 @@ TEST(CriticalFactor, OfAHeavyColumnIsOneWhateverTheSteps) {
   EXPECT_NEAR(first, greenhill, 2e-3 * greenhill); // of 20 edges: 2.0e-3 x (16/20)^2 in docs/critical_loads.md
 }
 
+/// A tight twisted rod that is let go: where it loses its stiffness other motions almost do, and Newton's answers are
+/// rough (bisection of them is off by 2e-7).
+TEST(CriticalFactor, OfATwistedRodIsOneWhateverTheSteps) {
+  const Scene scene = sceneOf("verify/writhing.yaml");
+  double first = 0;
+  for (const int steps : {1, 3, 7, 40}) {
+    LoopSettings settings = statics(steps);
+    settings.bifurcation = Bifurcation::stop;
+    const Path path = follow(scene, settings);
+    ASSERT_EQ(path.critical.size(), 1u) << steps;
+    if (first == 0) first = path.critical[0].load_factor;
+    EXPECT_NEAR(path.critical[0].load_factor, first, 3e-8 * first) << steps; // measured 1e-8
+  }
+}
+
 /// A rod that hangs out from an axis about which it turns may stand anywhere around it.
 TEST(CriticalFactor, IsNoneWhereAMotionCostsNothing) {
   const Scene scene = sceneOf("verify/conical.yaml");
@@ -349,7 +363,7 @@ TEST(CriticalFactor, IsNoneWhereAMotionCostsNothing) {
 
 TEST(CriticalFactor, AlongTheArcLengthIsThatOfLoadSteps) {
   const Scene scene = sceneOf("column.yaml");
-  const double exact = discreteEulerLoad(64) / 4;
+  const double euler = discreteEulerLoad(64), exact = euler / 4 * (1 - euler / 1e8);
   for (const int steps : {3, 10, 20, 40}) {
     const Path path = follow(scene, along(steps, 200));
     ASSERT_EQ(path.critical.size(), 1u) << steps;
