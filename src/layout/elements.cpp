@@ -18,7 +18,7 @@ std::array<double, 3> integratedStrain(const Vec3 &strain, double length, Measur
 class CellBuilder {
 public:
   CellBuilder(const Scene &scene, int rod, Elements &out)
-      : rod_(scene.rods[rod]), range_(out.rods[rod]), loose_(out.loose[rod]), out_(out),
+      : rod_(scene.rods[rod]), range_(out.rods[rod]), loose_(out.loose[rod]), next_(range_.looseSlot()), out_(out),
         holder_(rod_.vertices(), nullptr) {
     for (std::size_t s = 0; s < scene.supports.size(); ++s) {
       const Support &support = scene.supports[s];
@@ -74,6 +74,7 @@ private:
   const Rod &rod_;
   const RodRange &range_;
   std::vector<LooseCell> &loose_;
+  int next_; ///< slot of a frame or cell along the rod
   Elements &out_;
   std::vector<const Support *> holder_; ///< of the twist at each vertex
   const Support *supports_;
@@ -84,7 +85,7 @@ private:
   /// A support's frame takes the place of the edge that is missing at an end; along a rod it gets a slot of its own.
   int frameSlot(int v) {
     if (isEnd(v)) return range_.slot(v == 0 ? -1 : v);
-    return out_.slots++;
+    return next_++;
   }
 
   /// The half cell between an edge and the frame that holds its end: Lbar = L/2, lbar = l/2.
@@ -94,7 +95,7 @@ private:
         holder.kind == Support::Kind::clamp ? rod_.material.flexural_stiffness : std::array<double, 2>{0, 0};
     int slot = range_.slot(v);
     if (!isEnd(v)) {
-      slot = out_.slots++;
+      slot = next_++;
       const int frame = out_.support_slot[&holder - supports_], middle = place(v);
       loose_.push_back(edge_first ? LooseCell{slot, middle - 1, frame, middle}
                                   : LooseCell{slot, frame, middle, middle});
@@ -137,10 +138,9 @@ private:
 Elements::Elements(const Scene &scene, const DofMap &dofs)
     : rods(dofs.rods()), slots(dofs.slots()), loose(rods.size()), end_couples(rods.size()),
       support_slot(scene.supports.size(), -1), rod_cells{0} {
-  const int most = slots + 3 * int(scene.supports.size()); // a frame and two cells for each support along a rod
-  constants_ = Planes(7, most);
-  cells_ = Planes(cell_planes, most);
-  for (const int plane : {1, 2}) std::fill_n(constants_[plane], most, 1.0);
+  constants_ = Planes(7, slots);
+  cells_ = Planes(cell_planes, slots);
+  for (const int plane : {1, 2}) std::fill_n(constants_[plane], slots, 1.0);
   double *mass = constants_[0];
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
     const Rod &rod = scene.rods[r];

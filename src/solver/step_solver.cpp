@@ -29,11 +29,8 @@ std::vector<RodSet> blocksOf(const std::vector<RodRange> &rods) {
 PetscErrorCode StepSolver::setUp(IncrementalPotential &potential, Coupling coupling) {
   PetscFunctionBeginUser;
   potential_ = &potential;
-  const Elements &e = potential.elements();
-  // Loose cells are not beside their rod, where the work arrays of a block end.
-  const bool loose = std::any_of(e.loose.begin(), e.loose.end(), [](const auto &cells) { return !cells.empty(); });
   std::vector<RodSet> blocks;
-  if (coupling == Coupling::none && !loose) blocks = blocksOf(e.rods);
+  if (coupling == Coupling::none) blocks = blocksOf(potential.elements().rods);
   if (blocks.size() > 1) {
     PetscCall(setUpBlocks(blocks));
     if (front().isBanded()) PetscFunctionReturn(0);
@@ -45,11 +42,8 @@ PetscErrorCode StepSolver::setUp(IncrementalPotential &potential, Coupling coupl
 /// Stops after the first when it shows that another solver than `banded` was chosen, which needs the scene as one.
 PetscErrorCode StepSolver::setUpBlocks(const std::vector<RodSet> &blocks) {
   PetscFunctionBeginUser;
-  int slots = potential_->elements().slots;
-  if (blocks.size() > 1) {
-    slots = 0;
-    for (const RodSet &block : blocks) slots = std::max(slots, potential_->dofs().slots(block));
-  }
+  int slots = 0;
+  for (const RodSet &block : blocks) slots = std::max(slots, potential_->dofs().slots(block));
   blocks_.clear();
   work_.emplace(*potential_, slots);
   for (const RodSet &block : blocks) {

@@ -30,7 +30,7 @@ public:
   std::vector<RodRange> rods;
   std::vector<Measure> measure; ///< per rod
   std::vector<Energy> energy;   ///< per rod
-  int slots = 0;                ///< those of DofMap, then those of loose cells and their frames
+  int slots = 0;                ///< those of DofMap
 
   /// Regular cells of a rod, [begin, end): the cell at slot s joins the frames at s - 1 and s.
   std::vector<int> cell_begin, cell_end;

@@ -20,6 +20,10 @@ struct RodRange {
   int slot(int i) const { return first_slot + i; }
   int vertexEnd() const { return first_slot + vertices; }
   int edgeEnd() const { return first_slot + edges; }
+  /// Slots behind the last vertex that loops over it may touch: copies of a ring's first two, and a pack.
+  static constexpr int behind = 2 + lanes;
+  /// Where the frames and cells of supports along the rod begin.
+  int looseSlot() const { return vertexEnd() + behind; }
 };
 
 /// Rods that follow each other in the scene, [begin, end).
