@@ -133,8 +133,7 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
       potential_->step().hessian == HessianKind::exact ? HessianKind::uncompressed : potential_->step().hessian;
   bool compressed = false;
   for (int r = rods_.begin; r < rods_.end; ++r) {
-    if (!work_->wanted[r] || work_->negative[r] <= (banded_ || inertia_ ? few : few * (rods_.end - rods_.begin)))
-      continue;
+    if (!work_->wanted[r] || work_->negative[r] <= few) continue;
     potential_->assembleRod(r, kind);
     compressed = true;
   }

@@ -219,9 +219,8 @@ std::string NewtonSolver::farthest() {
   return tellImbalance(*potential_, rod, asked());
 }
 
-/// The first rod that is unstable in the Hessian factored last, in words, where that tells them apart.
+/// The first rod that is unstable in the Hessian factored last, in words.
 std::string NewtonSolver::unstableRod() const {
-  if (!banded_ && !inertia_ && rods_.end - rods_.begin > 1) return "";
   for (int r = rods_.begin; r < rods_.end; ++r)
     if (const int count = work_->negative[r]; count > 0)
       return "; " + labelOf(potential_->scene().rods[r]) + ": forces and moments are in balance, and " +

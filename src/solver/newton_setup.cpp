@@ -120,7 +120,7 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
     PetscCall(dofs.createMatrix(jacobian_.out()));
   PetscCall(SNESSetJacobian(snes_, jacobian_, jacobian_, jacobianCallback, this));
   if (type && std::string(type) == MATSOLVERMUMPS) PetscCall(askMumpsForInertia(pc, jacobian_));
-  if (!cholesky) {
+  if (!banded_ && (!cholesky || set.end - set.begin > 1)) {
     PetscCall(createBandedMatrix(&system_, band_.out()));
     PetscCall(KSPCreate(PETSC_COMM_SELF, inertia_.out()));
     PetscCall(KSPSetType(inertia_, KSPPREONLY));

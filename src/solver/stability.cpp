@@ -264,12 +264,9 @@ PetscErrorCode NewtonSolver::escapeSaddle(bool *left, bool *neutral) {
   std::vector<char> found, neutral_rods;
   const std::vector<int> negative = work_->negative;
   PetscCall(findBucklingModes(&found, &neutral_rods));
-  bool all = true, any = false; // of the rods with negative pivots
+  *neutral = true;
   for (int r = rods_.begin; r < rods_.end; ++r) {
-    if (negative[r] > 0) {
-      all = all && neutral_rods[r];
-      any = any || neutral_rods[r];
-    }
+    if (negative[r] > 0) *neutral = *neutral && neutral_rods[r];
     if (!found[r]) continue;
     const double turning = turningOf(r); // one unit: the edge that turns most turns by one radian
     RetractionKind best_kind = RetractionKind::length;
@@ -291,7 +288,6 @@ PetscErrorCode NewtonSolver::escapeSaddle(bool *left, bool *neutral) {
     potential_->resetAxialForces(r);
     *left = true;
   }
-  *neutral = banded_ || inertia_ ? all : any;
   if (!*left) PetscFunctionReturn(0);
   forgetEnergies();
   ++report_.escapes;

@@ -1,19 +1,9 @@
 /// Any linear solver gives the same run: `banded` reads the band itself, the others get a matrix of PETSc's.
+#include "support/option_set.hpp"
 #include "support/rods.hpp"
 
 namespace tendril::test {
 namespace {
-
-/// While it lives, an option of PETSc is set.
-class OptionSet {
-public:
-  OptionSet(const char *name, const char *value) : name_(name) { (void)PetscOptionsSetValue(nullptr, name, value); }
-  ~OptionSet() { (void)PetscOptionsClearValue(nullptr, name_); }
-  OptionSet(const OptionSet &) = delete;
-
-private:
-  const char *name_;
-};
 
 /// A cantilever and a ring that falls beside it, under weight.
 Scene chainAndRing() {

@@ -82,8 +82,8 @@ struct NewtonWork {
   void setOrigin(int first_slot);
   std::vector<char> wanted;              ///< rods that have not converged yet
   std::vector<double> shift, last_shift; ///< of the diagonal of indefinite Hessians, now and when it was last needed
-  std::vector<int> negative, zero; ///< pivots; of all rods together where the linear solver does not tell them apart
-  std::vector<char> indefinite;    ///< rods whose Hessian gives no way down as it is
+  std::vector<int> negative, zero;       ///< pivots
+  std::vector<char> indefinite;          ///< rods whose Hessian gives no way down as it is
   std::vector<IncrementalPotential::RodEnergy> energy; ///< at the iterate, ...
   std::vector<char> energy_known;                      ///< ... where it has been computed
   std::vector<Residual> residual;
@@ -140,7 +140,7 @@ private:
   BandedSystem system_;
   OwnedMat jacobian_;
   bool banded_ = true;
-  OwnedMat band_;    ///< where the solver that was chosen has no inertia: the same matrix once more, ...
+  OwnedMat band_;    ///< where the solver that was chosen has no inertia of each rod: the same matrix once more, ...
   OwnedKSP inertia_; ///< ... factored by `banded`, which tells what is a minimum, and how far an iterate is from it
   OwnedVec x_, f_, right_, solution_;
   std::optional<Circulatory> circulatory_; ///< where couples act
