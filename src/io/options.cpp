@@ -302,8 +302,8 @@ void resolve(const RunSettings &scene, Options &o) {
     o.loop.dt = o.dt.value_or(scene.dt);
     o.loop.t_end = o.t_end.value_or(scene.t_end);
     if (o.loop.t_end / o.loop.dt > 1e12)
-      fail("dt", "a step of " + std::to_string(o.loop.dt) + " s never reaches the end at " +
-                     std::to_string(o.loop.t_end) + " s; write a larger dt or a smaller t_end");
+      fail("dt", "a step of " + shortText(o.loop.dt) + " s never reaches the end at " + shortText(o.loop.t_end) +
+                     " s; write a larger dt or a smaller t_end");
   } else {
     if (o.dt) fail("dt", "has no meaning in -mode static; use -load_steps");
     if (o.t_end) fail("t_end", "has no meaning in -mode static; the load factor ends at 1");
@@ -324,8 +324,9 @@ void resolve(const RunSettings &scene, Options &o) {
 
 std::vector<int> edgesAsked(const Scene &scene, const Options &o) {
   std::vector<int> edges = edgesOf(scene);
+  const RodNames names(scene.rods);
   for (const auto &[name, number] : o.rod_edges) {
-    const std::vector<int> rods = rodsOf(scene.rods, name);
+    const std::vector<int> rods = names.find(name);
     if (rods.empty())
       fail("rod_edges", "there is no rod '" + name + "'; write a name of the scene, a number from 0 to " +
                             std::to_string(edges.size() - 1) + ", or edges alone for all");

@@ -119,11 +119,6 @@ void readDirectors(YamlMap &map, Rod &rod) {
   setBishopDirectors(rod, start);
 }
 
-/// Rods of one block of the scene share its name and add a number.
-bool isNamed(const Rod &rod, const std::string &name) {
-  return rod.name == name || rod.name.rfind(name + ".", 0) == 0 || rod.name.rfind(name + "#", 0) == 0;
-}
-
 void readNatural(YamlMap &map, Rod &rod) {
   const YamlValue v = map.at("rods[].natural");
   if (v.isMap()) {
@@ -137,13 +132,10 @@ void readNatural(YamlMap &map, Rod &rod) {
 }
 
 /// Name of a rod, by which supports and loads may find it without doubt.
-std::string readName(YamlMap &map, const std::vector<Rod> &rods) {
-  auto isTaken = [&](const std::string &name) {
-    return std::any_of(rods.begin(), rods.end(), [&](const Rod &rod) { return isNamed(rod, name); });
-  };
+std::string readName(YamlMap &map, const RodNames &names) {
   if (!map.has("rods[].name")) {
-    const std::string name = "rod" + std::to_string(rods.size());
-    if (isTaken(name))
+    const std::string name = "rod" + std::to_string(names.count());
+    if (names.isTaken(name))
       map.value().fail("a rod without a name is '" + name + "', and there is one already; give this rod a 'name'");
     return name;
   }
@@ -153,7 +145,7 @@ std::string readName(YamlMap &map, const std::vector<Rod> &rods) {
     v.fail("'name' must not be empty, a number or 'all', found '" + name + "'");
   if (std::any_of(name.begin(), name.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; }))
     v.fail("'name' must be in one line, found '" + inOneLine(name) + "'");
-  if (isTaken(name)) v.fail("there is a rod '" + name + "' already; choose another 'name'");
+  if (names.isTaken(name)) v.fail("there is a rod '" + name + "' already; choose another 'name'");
   return name;
 }
 
@@ -167,7 +159,7 @@ struct Sums {
 void readRod(const YamlValue &value, const Overrides &overrides, SceneFile &out, Sums &sums) {
   std::vector<Rod> &rods = out.scene.rods;
   YamlMap map(value, "rods");
-  const std::string name = readName(map, rods);
+  const std::string name = readName(map, out.names);
   double least_edges = 1;
   std::vector<Polyline> shapes = readShape(map, &least_edges);
   if (map.has("rods[].place")) place(map.at("rods[].place"), shapes);
@@ -221,6 +213,7 @@ void readRod(const YamlValue &value, const Overrides &overrides, SceneFile &out,
       if (rod.material.isCable() && rod.initial_turns != 0)
         map.at("rods[].turns").fail("a rod without flexural stiffness has no twist");
       rods.push_back(rod);
+      out.names.add(rod.name);
       Drawing &drawing = out.drawings.emplace_back();
       drawing.directors_given = map.has("rods[].directors");
       drawing.least_edges = least_edges;
@@ -264,13 +257,6 @@ void keepFiles(const YamlValue &rods, SceneSource &source) {
 }
 
 } // namespace
-
-std::vector<int> rodsOf(const std::vector<Rod> &rods, const std::string &word) {
-  std::vector<int> found;
-  for (std::size_t r = 0; r < rods.size(); ++r)
-    if (word == "all" || isNamed(rods[r], word) || std::to_string(r) == word) found.push_back(int(r));
-  return found;
-}
 
 SceneFile readScene(const std::string &path, const Overrides &overrides) {
   SceneFile out;

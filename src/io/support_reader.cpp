@@ -14,17 +14,17 @@ Vec3 unit(const YamlValue &value) {
 namespace {
 
 /// Rods a support or load speaks of: a name, a number, or `all`.
-std::vector<int> readTargets(YamlMap &map, KeyOf<KeyType::rod> key, const std::vector<Rod> &rods) {
+std::vector<int> readTargets(YamlMap &map, KeyOf<KeyType::rod> key, const RodNames &rods) {
   if (!map.has(*key)) {
-    if (rods.size() > 1) map.value().fail("say which 'rod' is meant: a name, a number from 0, or all");
+    if (rods.count() > 1) map.value().fail("say which 'rod' is meant: a name, a number from 0, or all");
     return {0};
   }
   const YamlValue v = map.at(*key);
   const std::string word = v.text();
-  const std::vector<int> found = rodsOf(rods, word);
+  const std::vector<int> found = rods.find(word);
   if (found.empty())
     v.fail("there is no rod '" + word + "'; write the name of a rod, its number from 0 to " +
-           std::to_string(rods.size() - 1) + ", or all");
+           std::to_string(rods.count() - 1) + ", or all");
   return found;
 }
 
@@ -80,7 +80,7 @@ void readSupport(const YamlValue &value, SceneFile &out) {
   YamlMap map(value, "supports");
   bool warned = false;
   const std::string type = map.word("supports[].type");
-  for (const int r : readTargets(map, "supports[].rod", scene.rods)) {
+  for (const int r : readTargets(map, "supports[].rod", out.names)) {
     const Rod &rod = scene.rods[r];
     Support s{};
     s.kind = type == "clamp" ? Support::Kind::clamp : type == "pin" ? Support::Kind::pin : Support::Kind::fix_twist;
@@ -136,7 +136,7 @@ void readLoad(const YamlValue &value, SceneFile &out) {
   Scene &scene = out.scene;
   YamlMap map(value, "loads");
   bool warned = false;
-  for (const int r : readTargets(map, "loads[].rod", scene.rods)) {
+  for (const int r : readTargets(map, "loads[].rod", out.names)) {
     const Rod &rod = scene.rods[r];
     if (map.has("loads[].force")) {
       const NodalForce &load = scene.forces.emplace_back(r, readIndex(map, "loads[].vertex", rod.vertices(), rod.name),

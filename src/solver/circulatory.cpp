@@ -6,14 +6,17 @@ namespace tendril {
 
 Circulatory::Circulatory(const IncrementalPotential &potential, RodSet rods)
     : potential_(potential), rods_(rods), counts_(rods.end - rods.begin) {
-  for (int r = rods.begin; r < rods.end; ++r)
-    for (const EdgeMoment &m : potential.scene().moments) {
-      if (m.rod != r) continue;
+  for (const EdgeMoment &m : potential.scene().moments)
+    if (m.rod >= rods.begin && m.rod < rods.end) {
       couples_.push_back(m);
-      ++counts_[r - rods.begin];
+      ++counts_[m.rod - rods.begin];
     }
+  std::stable_sort(couples_.begin(), couples_.end(),
+                   [](const EdgeMoment &a, const EdgeMoment &b) { return a.rod < b.rod; });
   const int most = *std::max_element(counts_.begin(), counts_.end());
-  solved_.assign(2 * most, potential.dofs().makePlanes());
+  right_ = Planes(slot_size, most > 0 ? potential.dofs().slots(rods) : 0);
+  right_.setOrigin(potential.dofs().rods()[rods.begin].first_slot);
+  solved_.assign(2 * most, right_);
 }
 
 double Circulatory::Column::dot(const Planes &x) const {
@@ -41,16 +44,15 @@ PetscErrorCode Circulatory::update(const Solve &solve) {
       columns_.push_back({couple.rod, slot, d.cross(f.tangent) / f.length, d.dot(f.tangent)});
     strength_.push_back(0.5 * size);
   }
-  Planes right = potential_.dofs().makePlanes();
   for (std::size_t k = 0; k < solved_.size(); ++k) {
-    right.clear();
+    right_.clear();
     std::size_t first = 0;
     for (int r = rods_.begin; r < rods_.end; first += 2 * counts_[r++ - rods_.begin]) {
       if (k >= std::size_t(2 * counts_[r - rods_.begin])) continue;
-      columns_[first + k].addTo(right);
-      potential_.dofs().fold(potential_.dofs().rods()[r], right);
+      columns_[first + k].addTo(right_);
+      potential_.dofs().fold(potential_.dofs().rods()[r], right_);
     }
-    PetscCall(solve(right, solved_[k]));
+    PetscCall(solve(right_, solved_[k]));
   }
   PetscFunctionReturn(0);
 }

@@ -8,36 +8,39 @@ using C = Configuration;
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
+SupportMotion::SupportMotion(const Scene &scene, const DofMap &dofs, const Elements &elements)
+    : scene_(scene), dofs_(dofs), elements_(elements), moving_(elements.rods.size()), turned_(elements.rods.size()) {
+  for (std::size_t s = 0; s < scene.supports.size(); ++s)
+    if (scene.supports[s].motion.moves()) moving_[scene.supports[s].rod].push_back(int(s));
+}
+
 void SupportMotion::turn(const Configuration &from, double from_time, double to_time) {
   beyond_barrier_ = false;
-  turned_.clear();
-  for (std::size_t s = 0; s < scene_.supports.size(); ++s) {
-    const int slot = elements_.support_slot[s];
-    const Motion &motion = scene_.supports[s].motion;
-    if (slot < 0 || !motion.moves()) continue;
-    Turned turned{scene_.supports[s].rod, slot, 0.0, from.frameAt(slot)};
-    // In parts of less than half a radian, so that whole turns within the step are counted.
-    const int parts = 1 + int(2 * (motion.rotationVectorAt(to_time) - motion.rotationVectorAt(from_time)).norm());
-    for (int k = 1; k <= parts; ++k) {
-      const double time = k == parts ? to_time : from_time + (to_time - from_time) * k / parts;
-      const Frame now = supportFrame(scene_.supports[s], time);
-      turned.angle += halfAngleBetween(turned.end, now).angle();
-      turned.end = now;
+  for (std::size_t r = 0; r < moving_.size(); ++r) {
+    turned_[r].clear();
+    for (const int s : moving_[r]) {
+      const int slot = elements_.support_slot[s];
+      const Motion &motion = scene_.supports[s].motion;
+      if (slot < 0) continue;
+      Turned turned{slot, 0.0, from.frameAt(slot)};
+      // In parts of less than half a radian, so that whole turns within the step are counted.
+      const int parts = 1 + int(2 * (motion.rotationVectorAt(to_time) - motion.rotationVectorAt(from_time)).norm());
+      for (int k = 1; k <= parts; ++k) {
+        const double time = k == parts ? to_time : from_time + (to_time - from_time) * k / parts;
+        const Frame now = supportFrame(scene_.supports[s], time);
+        turned.angle += halfAngleBetween(turned.end, now).angle();
+        turned.end = now;
+      }
+      turned_[r].push_back(turned);
     }
-    turned_.push_back(turned);
   }
 }
 
 void SupportMotion::follow(int r, Configuration &iterate) {
-  bool any = false;
-  for (const Turned &turned : turned_) {
-    if (turned.rod != r) continue;
-    iterate.setFrame(turned.slot, turned.end);
-    any = true;
-  }
-  if (!any) return;
+  if (turned_[r].empty()) return;
+  for (const Turned &turned : turned_[r]) iterate.setFrame(turned.slot, turned.end);
   auto turning = [&](int frame) {
-    for (const Turned &turned : turned_)
+    for (const Turned &turned : turned_[r])
       if (turned.slot == frame) return turned.angle;
     return 0.0;
   };
@@ -56,17 +59,19 @@ void SupportMotion::follow(int r, Configuration &iterate) {
 
 bool SupportMotion::remaining(const Configuration &iterate, double time, RodSet rods, Planes &increment) const {
   bool any = false;
-  for (const Support &s : scene_.supports) {
-    if (s.rod < rods.begin || s.rod >= rods.end || !s.holdsPosition() || !s.motion.moves()) continue;
-    const RodRange &rod = elements_.rods[s.rod];
-    const int slot = rod.slot(s.vertex);
-    const Vec3 target = scene_.rods[s.rod].position[s.vertex] + s.motion.displacementAt(time);
-    Vec3 d = (target - iterate.positionAt(slot)) - iterate.values().vector(C::position_low, slot);
-    if (d.norm() <= 4 * epsilon * target.norm()) d.setZero();
-    any = any || !d.isZero(0);
-    increment.setVector(0, slot, d);
-    dofs_.copyBehindRing(rod, increment);
-  }
+  for (int r = rods.begin; r < rods.end; ++r)
+    for (const int k : moving_[r]) {
+      const Support &s = scene_.supports[k];
+      if (!s.holdsPosition()) continue;
+      const RodRange &rod = elements_.rods[r];
+      const int slot = rod.slot(s.vertex);
+      const Vec3 target = scene_.rods[r].position[s.vertex] + s.motion.displacementAt(time);
+      Vec3 d = (target - iterate.positionAt(slot)) - iterate.values().vector(C::position_low, slot);
+      if (d.norm() <= 4 * epsilon * target.norm()) d.setZero();
+      any = any || !d.isZero(0);
+      increment.setVector(0, slot, d);
+      dofs_.copyBehindRing(rod, increment);
+    }
   return any;
 }
 

@@ -3,6 +3,7 @@
 /// Scenes from YAML. docs/user.md describes every key.
 
 #include "tendril/io/material_reader.hpp"
+#include "tendril/io/rod_names.hpp"
 #include "tendril/model/redraw.hpp"
 
 namespace tendril {
@@ -26,14 +27,11 @@ struct SceneSource {
 struct SceneFile {
   Scene scene;
   SceneSource source;
+  RodNames names;
   std::vector<Drawing> drawings; ///< per rod
   RunSettings run;
   std::vector<std::string> notes; ///< to be told at the start: defaults of materials, and warnings
 };
-
-/// Rods that a word means: a name, which is also that of all rods of its block, a number from 0, or `all`. Empty where
-/// it means none.
-std::vector<int> rodsOf(const std::vector<Rod> &rods, const std::string &word);
 
 /// \throws SceneError
 SceneFile readScene(const std::string &path, const Overrides &overrides = {});

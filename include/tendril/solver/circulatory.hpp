@@ -49,6 +49,7 @@ private:
   std::vector<int> counts_;         ///< per rod
   std::vector<Column> columns_;     ///< two for each couple
   std::vector<double> strength_;    ///< half of |M| for each couple [N m]
+  Planes right_;                    ///< of the rods, as those solved
   std::vector<Planes> solved_;      ///< the k-th columns of all rods, solved
 };
 

@@ -9,8 +9,7 @@ namespace tendril {
 
 class SupportMotion {
 public:
-  SupportMotion(const Scene &scene, const DofMap &dofs, const Elements &elements)
-      : scene_(scene), dofs_(dofs), elements_(elements) {}
+  SupportMotion(const Scene &scene, const DofMap &dofs, const Elements &elements);
 
   /// Takes up how the frames of all supports turn from where they are in a configuration. Whole turns count.
   void turn(const Configuration &from, double from_time, double to_time);
@@ -27,11 +26,12 @@ private:
   const DofMap &dofs_;
   const Elements &elements_;
   struct Turned {
-    int rod, slot;
+    int slot;
     double angle; ///< [rad]
     Frame end;
   };
-  std::vector<Turned> turned_; ///< frames that turn in this step
+  std::vector<std::vector<int>> moving_;    ///< supports that move, per rod
+  std::vector<std::vector<Turned>> turned_; ///< frames that turn in this step, per rod
   bool beyond_barrier_ = false;
 };
 
