@@ -264,7 +264,9 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
   double length = first;
   int rejected = 0, in_vain = 0; // steps since the last one accepted, and their iterations
   auto energyOf = [&](const State &at) {
-    return energyBudget(potential.scene(), potential.elements(), at, potential.iterate(), at.time);
+    EnergyBudget budget;
+    for (int r = 0; r < potential.all().end; ++r) budget += potential.energyBudget(at, potential.iterate(), at.time, r);
+    return budget;
   };
   EnergyBudget before = energyOf(state);
   for (int taken = 0; taken < settings_.arclength_steps && state.time < settings_.t_end;) {

@@ -93,8 +93,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     NewtonReport report;
     energy = {};
     auto addEnergy = [&](const State &end, int r) {
-      energy += energyBudget(potential.scene(), potential.elements(), end, potential.iterate(),
-                             settings_.dynamic ? 1 : step.time, r);
+      energy += potential.energyBudget(end, potential.iterate(), settings_.dynamic ? 1 : step.time, r);
     };
     StepError error;
     if (plain) { // each block is committed while it is in the cache

@@ -34,6 +34,35 @@ public:
                                                   : total<Measure::angle>(configuration, rod);
   }
 
+  [[gnu::flatten]] void addEnergies(const State &, const Configuration &c, double load_factor, int r,
+                                    EnergyBudget &out) const override {
+    Pack bend(0.0), twist(0.0);
+    EnergyBudget rod;
+    forCells(elements_, r, [&]<class T>(const LooseCell &cell, int count) {
+      const std::array<T, 3> s = presentStrain<T>(elements_, c, r, cell, count);
+      std::array<T, 3> e;
+      for (int k = 0; k < 3; ++k) {
+        const T d = s[k] - read<T>(elements_.cells()[cell_rest + k] + cell.slot);
+        e[k] = read<T>(elements_.cells()[cell_stiffness + k] + cell.slot) * d * d;
+      }
+      if constexpr (std::is_same_v<T, Pack>) {
+        bend += e[0] + e[1];
+        twist += e[2];
+      } else {
+        rod.bend += 0.5 * (e[0] + e[1]);
+        rod.twist += 0.5 * e[2];
+      }
+    });
+    rod.bend += 0.5 * reduce(bend);
+    rod.twist += 0.5 * reduce(twist);
+    for (const EndCouple &end : elements_.end_couples[r]) {
+      const std::array<double, 3> e = endEnergy(elements_, c, end, load_factor);
+      rod.bend += e[0] + e[1];
+      rod.twist += e[2];
+    }
+    out += rod;
+  }
+
   void addDerivatives(const Configuration &configuration, int rod, Derivatives &out,
                       HessianKind hessian) const override {
     elements_.measure[rod] == Measure::tan ? assemble<Measure::tan>(configuration, rod, hessian, out)

@@ -54,6 +54,18 @@ public:
     return 0.5 * weight_[r] * reduce(total);
   }
 
+  [[gnu::flatten]] void addEnergies(const State &state, const Configuration &, double, int r,
+                                    EnergyBudget &out) const override {
+    const RodRange &rod = elements_.rods[r];
+    double kinetic = 0;
+    for (int i = 0; i < rod.vertices; ++i)
+      kinetic += elements_.mass()[rod.slot(i)] * state.velocity[rod.first_vertex + i].squaredNorm();
+    for (int i = 0; i < rod.edges; ++i)
+      kinetic += elements_.twistMass()[rod.slot(i)] * state.twist_rate[rod.first_edge + i] *
+                 state.twist_rate[rod.first_edge + i];
+    out.kinetic += 0.5 * kinetic;
+  }
+
   [[gnu::flatten]] void addDerivatives(const Configuration &c, int r, Derivatives &out,
                                        HessianKind hessian) const override {
     const RodRange &rod = elements_.rods[r];

@@ -10,8 +10,9 @@ namespace {
 class Load final : public Term {
 public:
   Load(const Scene &scene, const Elements &elements)
-      : elements_(elements), turns_(!scene.rotation.angular_velocity.isZero(0)), centre_(scene.rotation.centre),
-        spin_(scene.rotation.matrix()), full_(3, elements.slots), couples_(scene.rods.size()) {
+      : scene_(scene), elements_(elements), turns_(!scene.rotation.angular_velocity.isZero(0)),
+        centre_(scene.rotation.centre), spin_(scene.rotation.matrix()), full_(3, elements.slots),
+        couples_(scene.rods.size()) {
     for (std::size_t r = 0; r < scene.rods.size(); ++r)
       if (scene.rods[r].gravity)
         for (int s = elements.rods[r].first_slot; s < elements.rods[r].vertexEnd(); ++s)
@@ -68,6 +69,21 @@ public:
     return sum;
   }
 
+  /// Forces and couples do work, and store nothing.
+  void addEnergies(const State &state, const Configuration &, double load_factor, int r,
+                   EnergyBudget &out) const override {
+    const RodRange &rod = elements_.rods[r];
+    double gravity = 0;
+    for (int i = 0; i < rod.vertices && scene_.rods[r].gravity; ++i)
+      gravity -= elements_.mass()[rod.slot(i)] * scene_.gravity.dot(state.position[rod.first_vertex + i]);
+    gravity *= load_factor;
+    for (int i = 0; i < rod.vertices && turns_; ++i) {
+      const Vec3 away = state.position[rod.first_vertex + i] - scene_.rotation.centre;
+      gravity -= 0.5 * load_factor * elements_.mass()[rod.slot(i)] * away.dot(spin_ * away);
+    }
+    out.gravity += gravity;
+  }
+
   void addDerivatives(const Configuration &c, int r, Derivatives &out, HessianKind hessian) const override {
     const RodRange &rod = elements_.rods[r];
     const BlockPlanes blocks(out.blocks, rod);
@@ -102,6 +118,7 @@ private:
     Vec3 tangent; ///< at the iterate
     double spin;
   };
+  const Scene &scene_;
   const Elements &elements_;
   bool turns_;
   Vec3 centre_;

@@ -22,6 +22,16 @@ public:
     return 0.5 * reduce(total);
   }
 
+  void addEnergies(const State &, const Configuration &c, double, int r, EnergyBudget &out) const override {
+    const RodRange &rod = elements_.rods[r];
+    Pack total(0.0);
+    for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
+      const Pack strain = read<Pack>(c[Configuration::strain] + s);
+      total += read<Pack>(elements_.axialStiffness() + s) * strain * strain * read<Pack>(elements_.restLength() + s);
+    }
+    out.stretch += 0.5 * reduce(total);
+  }
+
   void addDerivatives(const Configuration &configuration, int r, Derivatives &out, HessianKind hessian) const override {
     elements_.energy[r] == Energy::seed ? assemble<Energy::seed>(configuration, r, out, hessian)
                                         : assemble<Energy::classical>(configuration, r, out, hessian);

@@ -45,58 +45,6 @@ std::array<double, 3> endEnergy(const Elements &elements, const Configuration &c
           0.5 * end.compliance[2] * m[2] * m[2]};
 }
 
-[[gnu::flatten]] EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state,
-                                           const Configuration &c, double load_factor, int r) {
-  EnergyBudget budget;
-  const RodRange &rod = elements.rods[r];
-  double kinetic = 0, gravity = 0;
-  for (int i = 0; i < rod.vertices; ++i) {
-    const int v = rod.first_vertex + i;
-    const double mass = elements.mass()[rod.slot(i)];
-    kinetic += mass * state.velocity[v].squaredNorm();
-    gravity += mass * scene.gravity.dot(state.position[v]);
-  }
-  for (int i = 0; i < rod.edges; ++i)
-    kinetic +=
-        elements.twistMass()[rod.slot(i)] * state.twist_rate[rod.first_edge + i] * state.twist_rate[rod.first_edge + i];
-  budget.kinetic = 0.5 * kinetic;
-  budget.gravity = scene.rods[r].gravity ? -load_factor * gravity : 0;
-  if (!scene.rotation.angular_velocity.isZero(0))
-    for (int i = 0; i < rod.vertices; ++i) {
-      const Vec3 away = state.position[rod.first_vertex + i] - scene.rotation.centre;
-      budget.gravity -= 0.5 * load_factor * elements.mass()[rod.slot(i)] * away.dot(scene.rotation.matrix() * away);
-    }
-  Pack stretch(0.0), bend(0.0), twist(0.0);
-  for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
-    const Pack strain = read<Pack>(c[Configuration::strain] + s);
-    stretch += read<Pack>(elements.axialStiffness() + s) * strain * strain * read<Pack>(elements.restLength() + s);
-  }
-  forCells(elements, r, [&]<class T>(const LooseCell &cell, int count) {
-    const std::array<T, 3> s = presentStrain<T>(elements, c, r, cell, count);
-    std::array<T, 3> e;
-    for (int k = 0; k < 3; ++k) {
-      const T d = s[k] - read<T>(elements.cells()[cell_rest + k] + cell.slot);
-      e[k] = read<T>(elements.cells()[cell_stiffness + k] + cell.slot) * d * d;
-    }
-    if constexpr (std::is_same_v<T, Pack>) {
-      bend += e[0] + e[1];
-      twist += e[2];
-    } else {
-      budget.bend += 0.5 * (e[0] + e[1]);
-      budget.twist += 0.5 * e[2];
-    }
-  });
-  budget.stretch = 0.5 * reduce(stretch);
-  budget.bend += 0.5 * reduce(bend);
-  budget.twist += 0.5 * reduce(twist);
-  for (const EndCouple &end : elements.end_couples[r]) {
-    const std::array<double, 3> e = endEnergy(elements, c, end, load_factor);
-    budget.bend += e[0] + e[1];
-    budget.twist += e[2];
-  }
-  return budget;
-}
-
 EnergyBudget &EnergyBudget::operator+=(const EnergyBudget &other) {
   kinetic += other.kinetic;
   stretch += other.stretch;
@@ -107,14 +55,20 @@ EnergyBudget &EnergyBudget::operator+=(const EnergyBudget &other) {
 }
 
 EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, const Configuration &c,
-                          double load_factor) {
+                          double load_factor, int r) {
+  const AxialLaw axial(scene, elements);
   EnergyBudget budget;
-  for (int r = 0; r < int(elements.rods.size()); ++r) budget += energyBudget(scene, elements, state, c, load_factor, r);
+  for (const auto &term : makeTerms(scene, elements, axial, true)) term->addEnergies(state, c, load_factor, r, budget);
   return budget;
 }
 
 EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, double load_factor) {
-  return energyBudget(scene, elements, state, configurationOf(state, scene, elements, state.time), load_factor);
+  const AxialLaw axial(scene, elements);
+  const Configuration c = configurationOf(state, scene, elements, state.time);
+  EnergyBudget budget;
+  for (const auto &term : makeTerms(scene, elements, axial, true))
+    for (int r = 0; r < int(elements.rods.size()); ++r) term->addEnergies(state, c, load_factor, r, budget);
+  return budget;
 }
 
 } // namespace tendril

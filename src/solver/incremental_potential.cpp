@@ -99,6 +99,13 @@ IncrementalPotential::RodEnergy IncrementalPotential::rodEnergy(const Configurat
   return result;
 }
 
+EnergyBudget IncrementalPotential::energyBudget(const State &state, const Configuration &c, double load_factor,
+                                                int r) const {
+  EnergyBudget budget;
+  for (const auto &term : terms_) term->addEnergies(state, c, load_factor, r, budget);
+  return budget;
+}
+
 double IncrementalPotential::energy(const Configuration &configuration, RodSet rods) const {
   double sum = 0;
   for (int r = rods.begin; r < rods.end; ++r) sum += rodEnergy(configuration, r).value;

@@ -43,6 +43,12 @@ struct Derivatives {
   }
 };
 
+/// Stored and kinetic energies of a state, by name [J]; centrifugal potential counts as gravity.
+struct EnergyBudget {
+  double kinetic = 0, stretch = 0, bend = 0, twist = 0, gravity = 0;
+  double total() const { return kinetic + stretch + bend + twist + gravity; }
+  EnergyBudget &operator+=(const EnergyBudget &other);
+};
 class Term {
 public:
   virtual ~Term() = default;
@@ -60,6 +66,9 @@ public:
   /// Adds gradient and Hessian, pulled back by the retraction at the configuration.
   virtual void addDerivatives(const Configuration &configuration, int rod, Derivatives &out,
                               HessianKind hessian = HessianKind::exact) const = 0;
+  /// Adds what of it a state stores, without dissipation, under its names.
+  virtual void addEnergies(const State & /*state*/, const Configuration & /*of the state*/, double /*load_factor*/,
+                           int /*rod*/, EnergyBudget & /*out*/) const {}
   /// Derivative of the energy by turning the frame of a support, at its slot, about axes fixed in space [N m].
   virtual Vec3 momentOn(const Configuration & /*configuration*/, int /*rod*/, int /*frame*/) const {
     return Vec3::Zero();
@@ -109,19 +118,10 @@ std::unique_ptr<Term> makeLoad(const Scene &, const Elements &);
 std::array<double, 3> endEnergy(const Elements &elements, const Configuration &configuration, const EndCouple &end,
                                 double load_factor);
 
-/// Stored and kinetic energies of a state [J]; centrifugal potential counts as gravity.
-struct EnergyBudget {
-  double kinetic = 0, stretch = 0, bend = 0, twist = 0, gravity = 0;
-  double total() const { return kinetic + stretch + bend + twist + gravity; }
-  EnergyBudget &operator+=(const EnergyBudget &other);
-};
-/// Of one rod. \param configuration that of the state
+/// The energies of a state, from the terms of its scene (for tests and single questions: makes them anew).
 EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state,
                           const Configuration &configuration, double load_factor, int rod);
 /// Of all rods.
-EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state,
-                          const Configuration &configuration, double load_factor);
-/// The same, where the configuration is not at hand.
 EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, double load_factor);
 
 } // namespace tendril
