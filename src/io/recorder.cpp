@@ -1,0 +1,163 @@
+#include "tendril/io/recorder.hpp"
+
+#include "tendril/io/summary.hpp"
+#include "tendril/io/text.hpp"
+#include "tendril/solver/events.hpp"
+
+#include <iomanip>
+#include <sstream>
+
+namespace tendril {
+
+Recorder::Recorder(const Options &options, const Simulation &run, const StepControl &control, const RunFacts &facts,
+                   const Provenance &origin, Progress &progress)
+    : options_(options), run_(run), control_(control), facts_(facts), progress_(progress),
+      trajectory_(std::make_unique<TrajectoryWriter>(options.output_dir, run.scene, *run.elements, origin,
+                                                     options.fields, options.loop.dynamic)),
+      checkpoint_(options.output_dir + "/checkpoint.h5"),
+      arclength_(!options.loop.dynamic && options.loop.continuation == Continuation::arclength), widest_{pi / 6} {
+  trajectory_->writeFrame(run.state);
+  trajectory_->flushWhenDue();
+  if (const double interval = options.output_interval; interval > 0)
+    next_output_ = interval * (1 + std::floor(run.state.time / interval * (1 + 1e-12)));
+  widest_.include(run.scene, *run.elements, run.state); // told at the start
+  widest_.rod = -1;
+}
+
+PetscErrorCode Recorder::observe(const State &state, const Diagnostics &row) {
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(events().output, 0, 0, 0, 0));
+  ++steps_;
+  iterations_ += row.newton_iterations;
+  rejected_ += row.rejected_steps;
+  last_ = row;
+  trajectory_->writeDiagnostics(row);
+  if (arclength_ || state.time >= next_output_ * (1 - 1e-12) || state.time >= options_.loop.t_end) {
+    trajectory_->writeFrame(state);
+    widest_.include(run_.scene, *run_.elements, state);
+    while (options_.output_interval > 0 && next_output_ <= state.time * (1 + 1e-12))
+      next_output_ += options_.output_interval;
+  }
+  trajectory_->flushWhenDue();
+  if (options_.checkpoint_interval > 0 && state.step % options_.checkpoint_interval == 0) {
+    trajectory_->flush(); // a restart goes on where the frames end
+    writeCheckpoint(checkpoint_, run_, control_, facts_);
+  }
+  progress_.step(row);
+  dissipated_ += row.dissipated;
+  work_ += std::abs(row.work.total());
+  most_kinetic_ = std::max(most_kinetic_, row.energy.kinetic);
+  gained_ = std::max(gained_, -dissipated_);
+  if (!options_.loop.dynamic && row.negative_pivots > 0 && !told_unstable_) tellInstability(row);
+  PetscCall(PetscLogEventEnd(events().output, 0, 0, 0, 0));
+  PetscFunctionReturn(0);
+}
+
+void Recorder::tellInstability(const Diagnostics &row) {
+  const std::string count =
+      std::to_string(row.negative_pivots) + (row.negative_pivots == 1 ? " negative pivot" : " negative pivots");
+  progress_.say(
+      run_.scene.moments.empty()
+          ? "at load factor " + shortText(row.time) +
+                " the path is unstable, as it is wherever negative_pivots in the diagnostics is not 0: " + count
+          : "warning: " + count +
+                " at an accepted state with couples: couples have no potential, so its stability is not "
+                "known");
+  told_unstable_ = true;
+}
+
+PetscErrorCode Recorder::noteCritical(const CriticalPoint &point) {
+  PetscFunctionBeginUser;
+  std::ostringstream line;
+  line << (point.limit ? "limit point: " : "") << "critical load factor " << std::setprecision(10) << point.load_factor;
+  progress_.say(line.str());
+  critical_factors_.push_back(point.load_factor);
+  trajectory_->writeCritical(point.load_factor);
+  trajectory_->writeFrame(*point.state);
+  trajectory_->flush();
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Recorder::end(bool stopped) {
+  PetscFunctionBeginUser;
+  if (stopped && trajectory_->lastTime() < run_.state.time) trajectory_->writeFrame(run_.state);
+  PetscCall(PetscLogEventBegin(events().output, 0, 0, 0, 0));
+  const Summary at_end = summarize(run_.scene, *run_.elements, run_.state, options_.loop.dynamic ? 1 : run_.state.time);
+  trajectory_->writeSummary(at_end);
+  trajectory_->finish();
+  if (!arclength_) writeCheckpoint(checkpoint_, run_, control_, facts_);
+  PetscCall(PetscLogEventEnd(events().output, 0, 0, 0, 0));
+  std::ostringstream counts;
+  counts << steps_ << " steps, " << iterations_ << " Newton iterations (mean " << std::setprecision(3)
+         << (steps_ ? double(iterations_) / double(steps_) : 0) << "), " << rejected_ << " rejected, "
+         << last_.wall_seconds << " s, results in " << options_.output_dir;
+  progress_.say(counts.str());
+  for (const std::string &line : describe(at_end, run_.scene)) progress_.say(line);
+  PetscFunctionReturn(0);
+}
+
+namespace {
+
+/// What rounding moves [J]: 1e-9 of bending by one radian.
+double smallEnergy(const Simulation &run) {
+  double little = 0;
+  for (std::size_t r = 0; r < run.scene.rods.size(); ++r) {
+    const Material &m = run.scene.rods[r].material;
+    const double length = run.potential->length(int(r)),
+                 stiff = std::max(m.flexural_stiffness[0], m.flexural_stiffness[1]);
+    little += 1e-9 * (stiff > 0 ? stiff / length : 1e-6 * m.axial_stiffness * length);
+  }
+  return little;
+}
+
+/// The rod of the largest kinetic energy.
+std::size_t liveliest(const Simulation &run) {
+  std::size_t most = 0;
+  double largest = -1;
+  for (std::size_t r = 0; r < run.elements->rods.size(); ++r) {
+    const RodRange &rod = run.elements->rods[r];
+    double energy = 0;
+    for (int i = 0; i < rod.vertices; ++i)
+      energy +=
+          0.5 * run.elements->mass()[rod.slot(i)] * run.state.velocity[std::size_t(rod.first_vertex + i)].squaredNorm();
+    if (energy > largest) largest = energy, most = r;
+  }
+  return most;
+}
+
+} // namespace
+
+std::string Recorder::tellGrowth(bool finished) {
+  constexpr double told = 0.1, passes = 0.5; // of the motion's own energy and the work of loads and supports
+  const double moved = most_kinetic_ + work_, little = smallEnergy(run_);
+  if (!options_.loop.dynamic || !(gained_ > told * moved + little)) return {};
+  std::ostringstream growth;
+  growth << "the energy rose by " << std::setprecision(2) << gained_ / moved << " of the largest kinetic energy"
+         << (work_ > 0 ? " and the work of loads and supports" : "") << " (at most " << passes
+         << " passes), with nothing to put it in but -integrator " << options_.loop.integrator.name
+         << " in steps too long for it: shorten -dt, or take bdf2 or energy_momentum; "
+         << labelOf(run_.scene.rods[liveliest(run_)]) << " moves most";
+  // A method that is unstable has made most of the motion itself.
+  if (finished && gained_ > passes * moved + little) return growth.str();
+  progress_.say("warning: " + growth.str());
+  return {};
+}
+
+void Recorder::tellAccuracy() {
+  if (widest_.rod >= 0) {
+    std::ostringstream line;
+    line << "warning: neighbouring edges of rod '" << run_.scene.rods[std::size_t(widest_.rod)].name
+         << "' came to turn or twist by up to " << std::setprecision(3) << widest_.angle * 180 / pi
+         << " degrees, at vertex " << widest_.vertex << " and " << (options_.loop.dynamic ? "time " : "load factor ")
+         << widest_.time << "; measure tan is stiffer than the rod above 30: use more edges, or -rod_measure angle";
+    progress_.say(line.str());
+  }
+  if (last_.rounding_error > 0) {
+    std::ostringstream rounding;
+    rounding << "rounding error: " << std::setprecision(2) << last_.rounding_error << " of the rod length"
+             << (options_.loop.dynamic ? ", summed over the steps" : "");
+    progress_.say(rounding.str());
+  }
+}
+
+} // namespace tendril
