@@ -54,145 +54,173 @@ bool TimeLoop::adapt(double h, double dt_min, const StepError &error) {
   return accept;
 }
 
-PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finished) {
+/// The longest step, and the shortest one.
+double TimeLoop::longest() const {
+  return settings_.dt_max > 0 ? std::min(settings_.dt, settings_.dt_max) : settings_.dt;
+}
+double TimeLoop::shortest() const { return settings_.dt_min > 0 ? settings_.dt_min : longest() / 1024; }
+
+/// Solves the step. What it leads to is in `next` where blocks are committed one by one, while they are in the cache;
+/// else in the stages, from which accept() takes it. The state is not touched.
+PetscErrorCode TimeLoop::attempt(const State &state, State *next, Attempt *now) {
   PetscFunctionBeginUser;
   IncrementalPotential &potential = solver_.potential();
-  const double longest = settings_.dt_max > 0 ? std::min(settings_.dt, settings_.dt_max) : settings_.dt;
-  const double dt_min = settings_.dt_min > 0 ? settings_.dt_min : longest / 1024;
-  const bool adapts = settings_.dynamic && settings_.adapt == Adaptation::error;
-  if (control.dt == 0) control.dt = longest;
-  double &dt = control.dt;
-  int &good = control.good;
-  bool &stable = control.stable;
-  int rejected = 0, in_vain = 0; // steps since the last one accepted, and their iterations
+  if (!isPlain()) {
+    PetscCall(solveStages(state, now->step, &now->report));
+    solver_.on_block = nullptr;
+    if (now->report.converged && (adapts() || settings_.estimate_error)) now->error = stepError(state, now->h);
+    now->too_coarse = now->report.converged && adapts() && !adapt(now->h, shortest(), now->error);
+    PetscFunctionReturn(0);
+  }
+  solver_.on_block = [&](RodSet rods) {
+    potential.commit(*next, rods);
+    if (settings_.dynamic) noteActions(state, rods);
+    for (int r = rods.begin; r < rods.end; ++r) now->addEnergy(potential, *next, r);
+  };
+  actions_.assign(1, SupportActions(2 * moving_.size()));
+  std::optional<Guess> guess;
+  if (mode_) guess = alongMode(state, now->step);
+  PetscCall(solver_.solve(state, now->step, &now->report, Seek::minimum, guess ? &*guess : nullptr));
+  solver_.on_block = nullptr;
+  PetscFunctionReturn(0);
+}
+
+void TimeLoop::Attempt::addEnergy(const IncrementalPotential &potential, const State &end, int rod) {
+  energy += potential.energyBudget(end, potential.iterate(), step.load_factor, rod);
+}
+
+/// Whether a critical point may lie within the step. Couples have no potential: the inertia of the symmetric part says
+/// nothing about stability.
+bool TimeLoop::mayPassCritical(const State &state, const NewtonReport &report) const {
+  return !settings_.dynamic && settings_.bifurcation != Bifurcation::off &&
+         solver_.potential().scene().moments.empty() && control.stable && located_ <= state.time &&
+         (report.first_negative_pivots > 0 ||
+          (settings_.bifurcation != Bifurcation::locate && report.mayPassCritical()));
+}
+
+/// Makes the answer of a step the state. Work since the last row adds to `work`.
+void TimeLoop::accept(State &state, State &next, Attempt *now, Work *work) {
+  IncrementalPotential &potential = solver_.potential();
+  mode_.reset();
+  if (settings_.dynamic) {
+    *work = dynamicWork(state, now->h);
+    work->supports -= movedKinetic(state);
+  }
+  if (isPlain()) {
+    next.time = now->step.time;
+    next.step = state.step + 1;
+    if (!settings_.dynamic)
+      *work += staticWork(potential.scene(), potential.elements(), state, next, potential.start(), potential.iterate());
+    std::swap(state, next);
+  } else {
+    finishStages(state, now->h);
+    potential.commitConfiguration(state);
+    for (int r = 0; r < potential.all().end; ++r) now->addEnergy(potential, state, r);
+    control.error_sum += now->error.error;
+  }
+  if (settings_.dynamic) work->supports += movedKinetic(state);
+  control.stable = now->report.negative_pivots == 0;
+  control.rounding_sum =
+      settings_.dynamic ? control.rounding_sum + now->report.rounding_error : now->report.rounding_error;
+}
+
+/// Halves the step after a failure; false, with the reason, where it must not become shorter.
+bool TimeLoop::shorten(const State &state, double h, const NewtonReport &report) {
+  control.good = 0;
+  control.dt = 0.5 * h;
+  // A short last step may be halved as often, unless it was said how short steps may be.
+  const double least = settings_.dt_min > 0 ? shortest() : std::min(shortest(), (settings_.t_end - state.time) / 1024);
+  if (!report.lost && control.dt >= least * (1 - 1e-9)) return true;
+  std::ostringstream message;
+  message << (settings_.dynamic ? "step at time " : "load step at factor ") << state.time << " failed with "
+          << (settings_.dynamic ? "dt " : "increment ") << h << ": " << report.reason << " (" << report.iterations
+          << (report.iterations == 1 ? " iteration)" : " iterations)");
+  failure_ = message.str();
+  return false;
+}
+
+/// Load steps grow where they are easy; steps that a failure shortened come back after some that went well.
+void TimeLoop::lengthen(const NewtonReport &report) {
+  if (!settings_.dynamic && report.iterations <= 4 && report.escapes == 0)
+    control.dt = std::min(2 * control.dt, 4 * settings_.dt);
+  else if (!adapts() && control.dt < settings_.dt && ++control.good >= 4) {
+    control.dt = std::min(2 * control.dt, settings_.dt);
+    control.good = 0;
+  }
+}
+
+Diagnostics TimeLoop::rowOf(const State &state, const Attempt &now, const Work &work) {
+  Diagnostics row;
+  row.time = state.time;
+  row.dt = now.h;
+  row.energy = now.energy;
+  row.work = work;
+  row.dissipated = control.energy + work.total() - now.energy.total();
+  control.energy = now.energy.total();
+  row.newton_iterations = now.report.iterations;
+  row.line_search_trials = now.report.trials;
+  row.negative_pivots = now.report.negative_pivots;
+  row.error_estimate = control.error_sum;
+  row.rounding_error = control.rounding_sum;
+  return row;
+}
+
+PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finished) {
+  PetscFunctionBeginUser;
+  const Scene &scene = solver_.potential().scene();
+  const Elements &elements = solver_.potential().elements();
+  if (control.dt == 0) control.dt = longest();
   PetscLogDouble begin, now;
   PetscCall(PetscTime(&begin));
   // A run that begins has no step behind it, whatever the loop has run before.
   const bool goes_on = !std::isnan(control.energy) && (settings_.dynamic || state.time > 0);
-  if (!goes_on)
-    control.energy =
-        energyBudget(potential.scene(), potential.elements(), state, settings_.dynamic ? 1 : state.time).total();
-  moving_ = movingSupports(potential.scene());
-  Work work; // since the last row
-  *finished = false;
-  const bool plain = !settings_.dynamic || (integrator_->leavesChords() && !adapts && !settings_.estimate_error);
+  if (!goes_on) control.energy = energyBudget(scene, elements, state, settings_.dynamic ? 1 : state.time).total();
+  moving_ = movingSupports(scene);
+  Work work;                     // since the last row
+  int rejected = 0, in_vain = 0; // steps since then, and their iterations
   State next = state; // what the blocks that have converged come to; the state itself stays as it is until all have
-  EnergyBudget energy;
+  *finished = false;
   while (state.time < settings_.t_end) {
     if (settings_.dynamic && state.memory.empty())
-      PetscCall(integrator_->begin(solver_, dt, state)); // at the start, and where the state was written
+      PetscCall(integrator_->begin(solver_, control.dt, state)); // at the start, and where the state was written
+    Attempt step;
     double landing;
-    const double h = nextStep(state.time, &landing);
-    Step step = stepOf(settings_, state, h);
-    if (std::abs(step.time - landing) < 1e-9 * h) step.time = landing;
+    step.h = nextStep(state.time, &landing);
+    step.step = stepOf(settings_, state, step.h);
+    if (std::abs(step.step.time - landing) < 1e-9 * step.h) step.step.time = landing;
+    if (!settings_.dynamic) step.step.load_factor = step.step.time;
     const Doing here([&](std::ostream &out) {
       out << (settings_.dynamic ? "step at time " : "load step at factor ") << state.time << " of " << settings_.t_end
-          << (settings_.dynamic ? ", dt " : ", increment ") << h;
+          << (settings_.dynamic ? ", dt " : ", increment ") << step.h;
       if (rejected > 0) out << ", after " << rejected << " that failed";
     });
-    NewtonReport report;
-    energy = {};
-    auto addEnergy = [&](const State &end, int r) {
-      energy += potential.energyBudget(end, potential.iterate(), settings_.dynamic ? 1 : step.time, r);
-    };
-    StepError error;
-    if (plain) { // each block is committed while it is in the cache
-      solver_.on_block = [&](RodSet rods) {
-        potential.commit(next, rods);
-        if (settings_.dynamic) noteActions(state, rods);
-        for (int r = rods.begin; r < rods.end; ++r) addEnergy(next, r);
-      };
-      actions_.assign(1, SupportActions(2 * moving_.size()));
-      std::optional<Guess> guess;
-      if (mode_) guess = alongMode(state, step);
-      PetscCall(solver_.solve(state, step, &report, Seek::minimum, guess ? &*guess : nullptr));
-      solver_.on_block = nullptr;
-    } else {
-      PetscCall(solveStages(state, step, &report));
-      solver_.on_block = nullptr;
-      if (report.converged && (adapts || settings_.estimate_error)) error = stepError(state, h);
-      if (report.converged && adapts && !adapt(h, dt_min, error)) { // the state was not touched
-        ++rejected;
-        in_vain += report.iterations;
-        continue;
-      }
-    }
-    // Couples have no potential: the inertia of the symmetric part says nothing about stability.
-    const bool detects =
-        !settings_.dynamic && settings_.bifurcation != Bifurcation::off && potential.scene().moments.empty();
-    const bool passed =
-        report.first_negative_pivots > 0 || (settings_.bifurcation != Bifurcation::locate && report.mayPassCritical());
-    if (detects && stable && passed && located_ <= state.time) {
+    PetscCall(attempt(state, &next, &step));
+    if (!step.too_coarse && mayPassCritical(state, step.report)) {
       bool moved = false;
       const State before = state;
-      PetscCall(locate(state, step, &moved));
+      PetscCall(locate(state, step.step, &moved));
       *finished = moved && settings_.bifurcation == Bifurcation::stop;
       if (*finished) PetscFunctionReturn(0);
       if (moved) {
-        work += staticWork(potential.scene(), potential.elements(), before, state);
+        work += staticWork(scene, elements, before, state);
         next = state;
-        stable = false;
+        control.stable = false;
         continue;
       }
     }
-    if (report.converged) mode_.reset();
-    if (report.converged && settings_.dynamic) {
-      work = dynamicWork(state, h);
-      work.supports -= movedKinetic(state);
-    }
-    if (report.converged && plain) {
-      next.time = step.time;
-      next.step = state.step + 1;
-      if (!settings_.dynamic)
-        work +=
-            staticWork(potential.scene(), potential.elements(), state, next, potential.start(), potential.iterate());
-      std::swap(state, next);
-    } else if (report.converged) {
-      finishStages(state, h);
-      potential.commitConfiguration(state);
-      for (int r = 0; r < potential.all().end; ++r) addEnergy(state, r);
-      control.error_sum += error.error;
-    }
-    if (!report.converged) { // the state was not touched
+    if (!step.report.converged || step.too_coarse) { // the state was not touched
       ++rejected;
-      in_vain += report.iterations;
-      good = 0;
-      dt = 0.5 * h;
-      // A short last step may be halved as often, unless it was said how short steps may be.
-      const double shortest = settings_.dt_min > 0 ? dt_min : std::min(dt_min, (settings_.t_end - state.time) / 1024);
-      if (!report.lost && dt >= shortest * (1 - 1e-9)) continue;
-      std::ostringstream message;
-      message << (settings_.dynamic ? "step at time " : "load step at factor ") << state.time << " failed with "
-              << (settings_.dynamic ? "dt " : "increment ") << h << ": " << report.reason << " (" << report.iterations
-              << (report.iterations == 1 ? " iteration)" : " iterations)");
-      failure_ = message.str();
+      in_vain += step.report.iterations;
+      if (step.too_coarse || shorten(state, step.h, step.report)) continue;
       PetscFunctionReturn(0);
     }
-    stable = report.negative_pivots == 0;
-    if (!settings_.dynamic && report.iterations <= 4 && report.escapes == 0) // load steps grow where they are easy
-      dt = std::min(2 * dt, 4 * settings_.dt);
-    else if (!adapts && dt < settings_.dt && ++good >= 4) {
-      dt = std::min(2 * dt, settings_.dt);
-      good = 0;
-    }
-    if (settings_.dynamic) work.supports += movedKinetic(state);
-    Diagnostics row;
-    row.time = state.time;
-    row.dt = h;
-    row.energy = energy;
-    row.work = std::exchange(work, {});
-    row.dissipated = control.energy + row.work.total() - row.energy.total();
-    control.energy = row.energy.total();
-    row.newton_iterations = report.iterations;
-    row.line_search_trials = report.trials;
-    row.negative_pivots = report.negative_pivots;
+    accept(state, next, &step, &work);
+    lengthen(step.report);
+    Diagnostics row = rowOf(state, step, std::exchange(work, {}));
     row.rejected_steps = std::exchange(rejected, 0);
     row.rejected_iterations = std::exchange(in_vain, 0);
     PetscCall(PetscTime(&now));
     row.wall_seconds = now - begin;
-    row.error_estimate = control.error_sum;
-    control.rounding_sum = settings_.dynamic ? control.rounding_sum + report.rounding_error : report.rounding_error;
-    row.rounding_error = control.rounding_sum;
     PetscCall(observe(state, row));
     if (stops && state.time < settings_.t_end && stops()) PetscFunctionReturn(0);
   }

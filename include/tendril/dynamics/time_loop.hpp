@@ -85,6 +85,29 @@ private:
     double error = 0, moved = 0;
     bool known = false;
   };
+  /// A step that is tried.
+  struct Attempt {
+    Step step;
+    double h = 0; ///< its length [s, or load factor]
+    NewtonReport report;
+    EnergyBudget energy;
+    StepError error;
+    bool too_coarse = false; ///< for the error asked for
+    void addEnergy(const IncrementalPotential &potential, const State &end, int rod);
+  };
+  PetscErrorCode attempt(const State &state, State *next, Attempt *now);
+  bool mayPassCritical(const State &state, const NewtonReport &report) const;
+  void accept(State &state, State &next, Attempt *now, Work *work);
+  bool shorten(const State &state, double h, const NewtonReport &report);
+  void lengthen(const NewtonReport &report);
+  Diagnostics rowOf(const State &state, const Attempt &now, const Work &work);
+  double longest() const;
+  double shortest() const;
+  bool adapts() const { return settings_.dynamic && settings_.adapt == Adaptation::error; }
+  /// Whether blocks are committed one by one: in one stage, whose end is that of the step.
+  bool isPlain() const {
+    return !settings_.dynamic || (integrator_->leavesChords() && !adapts() && !settings_.estimate_error);
+  }
   PetscErrorCode solveStages(const State &start, const Step &step, NewtonReport *report);
   StepError stepError(const State &start, double h) const;
   void noteActions(const State &start, RodSet rods);
