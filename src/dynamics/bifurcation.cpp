@@ -210,7 +210,8 @@ PetscErrorCode locateCritical(StepSolver &solver, const Step &step, const Follow
       point->limit = !ahead;
       if (ahead && beyond.unstable > low.unstable)
         PetscCall(interpolate(solver, step, follow, before, beyond, low.parameter, &point->load_factor));
-      point->state = low.state;
+      point->state = low.state; // in balance at a load as near to the factor as equilibria are solved for
+      point->state->time = point->load_factor;
       point->lost.reset();
       if (ahead) point->lost = (beyond.unstable > low.unstable ? beyond : before).state;
       point->stable_count = std::min(low.unstable, beyond.unstable);
