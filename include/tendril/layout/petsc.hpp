@@ -23,8 +23,11 @@ public:
   }
   operator Object() const { return object_; }
   Object object() const { return object_; }
-  /// For PETSc's creation routines, which return through a pointer.
-  Object *out() { return &object_; }
+  /// For PETSc's creation routines, which return through a pointer; what was held is destroyed.
+  Object *out() {
+    if (object_) (void)destroy(&object_);
+    return &object_;
+  }
 
 private:
   Object object_ = nullptr;
