@@ -125,15 +125,19 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
   constexpr double longest = 0.1; // of the rod's length
   PetscFunctionBeginUser;
   if (regular && circulatory_ && potential_->step().isStatic()) {
-    fill(work_->indefinite, false);
-    PetscFunctionReturn(0);
+    bool any = false;
+    for (int r = rods_.begin; r < rods_.end; ++r) {
+      if (circulatory_->acts(r)) work_->indefinite[r] = false;
+      any = any || work_->indefinite[r];
+    }
+    if (!any) PetscFunctionReturn(0);
   }
   const int unshifted = report_.negative_pivots;
   const HessianKind kind =
       potential_->step().hessian == HessianKind::exact ? HessianKind::uncompressed : potential_->step().hessian;
   bool compressed = false;
   for (int r = rods_.begin; r < rods_.end; ++r) {
-    if (!work_->wanted[r] || work_->negative[r] <= few) continue;
+    if (!work_->wanted[r] || !work_->indefinite[r] || work_->negative[r] <= few) continue;
     potential_->assembleRod(r, kind);
     compressed = true;
   }

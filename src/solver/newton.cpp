@@ -211,23 +211,6 @@ void NewtonSolver::focus() {
   work_->setOrigin(potential_->elements().rods[rods_.begin].first_slot);
 }
 
-/// The rod that is farthest from its equilibrium, in words.
-std::string NewtonSolver::farthest() {
-  const int rod = farthestRod(*potential_, rods_, asked(), &work_->wanted);
-  if (rod >= 0 && isAtNoise(potential_->residual(rod, energyAtIterate(rod)), 0))
-    return "; " + roundingMessage(rod, sizeOf(rod, work_->increment));
-  return tellImbalance(*potential_, rod, asked());
-}
-
-/// The first rod that is unstable in the Hessian factored last, in words.
-std::string NewtonSolver::unstableRod() const {
-  for (int r = rods_.begin; r < rods_.end; ++r)
-    if (const int count = work_->negative[r]; count > 0)
-      return "; " + labelOf(potential_->scene().rods[r]) + ": forces and moments are in balance, and " +
-             std::to_string(count) + (count == 1 ? " motion lowers" : " motions lower") + " its energy";
-  return "";
-}
-
 /// SNES from the potential's iterate. `failure` is empty when it converged.
 PetscErrorCode NewtonSolver::newton(std::string *failure) {
   constexpr int limits_from_saddle = 10;
@@ -350,7 +333,9 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
       failure = "the equilibrium is unstable" + beyond;
       break;
     }
-    if (negative == 0 || (negative > 0 && !potential_->scene().moments.empty())) { // couples: no minimum to speak of
+    for (int r = rods_.begin; r < rods_.end && negative > 0 && circulatory_; ++r) // couples: no minimum to speak of
+      if (circulatory_->acts(r)) negative -= std::exchange(work_->negative[r], 0);
+    if (negative == 0) {
       PetscCall(settle(seek_));
       continue;
     }

@@ -200,4 +200,21 @@ std::string NewtonSolver::roundingMessage(int r, double size) const {
   return text.str();
 }
 
+/// The rod that is farthest from its equilibrium, in words.
+std::string NewtonSolver::farthest() {
+  const int rod = farthestRod(*potential_, rods_, asked(), &work_->wanted);
+  if (rod >= 0 && isAtNoise(potential_->residual(rod, energyAtIterate(rod)), 0))
+    return "; " + roundingMessage(rod, sizeOf(rod, work_->increment));
+  return tellImbalance(*potential_, rod, asked());
+}
+
+/// The first rod that is unstable in the Hessian factored last, in words.
+std::string NewtonSolver::unstableRod() const {
+  for (int r = rods_.begin; r < rods_.end; ++r)
+    if (const int count = work_->negative[r]; count > 0)
+      return "; " + labelOf(potential_->scene().rods[r]) + ": forces and moments are in balance, and " +
+             std::to_string(count) + (count == 1 ? " motion lowers" : " motions lower") + " its energy";
+  return "";
+}
+
 } // namespace tendril

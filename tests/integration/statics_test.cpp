@@ -217,6 +217,24 @@ TEST(StiffRing, RingsOfOneSceneLeaveEachByItself) {
     EXPECT_NEAR(bendingEnergy(sim, r), 2 * pi, 1.5e-3 * 2 * pi) << "EI1/EI2 " << stiffness[r]; // 4 x 2.5e-4
 }
 
+/// A couple on one rod says nothing of the stability of another.
+TEST(Columns, BuckleBesideARodWithACouple) {
+  Scene scene;
+  scene.gravity.setZero();
+  for (int r = 0; r < 2; ++r) {
+    Rod rod = straightRod(20, Measure::angle);
+    rod.material = {1, 0, 1e5, 1, {1, 1.3}, 0, 0};
+    for (Vec3 &x : rod.position) x.y() += r;
+    scene.rods.push_back(rod);
+    scene.supports.push_back(hold(scene, r, 0, Support::Kind::clamp));
+  }
+  scene.forces = {{0, 20, Vec3(-4, 0, 0)}}; // Euler's load is pi^2/4
+  scene.moments = {{1, 19, 0, Vec3(0, 0, 1)}};
+  Simulation sim;
+  runTo(sim, scene, statics(2));
+  EXPECT_GT((sim.state.position[20] - scene.rods[0].position[20]).tail<2>().norm(), 0.3);
+}
+
 /// MUMPS counts the pivots of all rods together: which of them are unstable, the band tells, and the others are not
 /// shifted.
 TEST(StiffRing, RingsOfOneSceneLeaveEachByItselfWithMumps) {
