@@ -174,7 +174,13 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
   PetscCall(PetscTime(&begin));
   // A run that begins has no step behind it, whatever the loop has run before.
   const bool goes_on = !std::isnan(control.energy) && (settings_.dynamic || state.time > 0);
-  if (!goes_on) control.energy = energyBudget(scene, elements, state, settings_.dynamic ? 1 : state.time).total();
+  if (!goes_on) {
+    const Configuration start = configurationOf(state, scene, elements, state.time);
+    EnergyBudget energy;
+    for (int r = 0; r < solver_.potential().all().end; ++r)
+      energy += solver_.potential().energyBudget(state, start, settings_.dynamic ? 1 : state.time, r);
+    control.energy = energy.total();
+  }
   moving_ = movingSupports(scene);
   Work work;                     // since the last row
   int rejected = 0, in_vain = 0; // steps since then, and their iterations
