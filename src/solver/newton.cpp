@@ -348,9 +348,11 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
       report_.zero_pivots += std::max(0, negative);
       report_.negative_pivots = 0;
       if (k == 0) report_.first_negative_pivots = 0;
-      const Configuration here = potential_->iterate();
+      const bool descends = creeps && potential_->elements().edges() <= most_searched_edges;
+      Configuration here;
+      if (descends) here = potential_->iterate();
       PetscCall(settle(Seek::equilibrium)); // Newton's own steps: a shift would drown the soft direction
-      if (failure.empty() || report_.lost || !creeps || potential_->elements().edges() > most_searched_edges) continue;
+      if (failure.empty() || report_.lost || !descends) continue;
       // The way down that was crept along is there, if too flat for its curvature to be told from rounding.
       for (int r = rods_.begin; r < rods_.end; ++r) potential_->accept(here, r);
       forgetEnergies();
