@@ -22,7 +22,8 @@ const std::vector<DiagnosticsColumn> &diagnosticsColumns() {
       {"rejected_iterations", "1", [](const D &d) { return double(d.rejected_iterations); }},
       {"rounding_error", "1", [](const D &d) { return d.rounding_error; }},
       {"work_loads", "J", [](const D &d) { return d.work.loads; }},
-      {"work_supports", "J", [](const D &d) { return d.work.supports; }}};
+      {"work_supports", "J", [](const D &d) { return d.work.supports; }},
+      {"constraint", "J", [](const D &d) { return d.energy.constraint; }}};
   return columns;
 }
 

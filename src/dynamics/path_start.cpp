@@ -13,6 +13,11 @@ void requireDeadLoads(const Scene &scene) {
       throw SceneError(
           "the support of rod '" + scene.rods[support.rod].name + "' at vertex " + std::to_string(support.vertex) +
           " moves: -continuation arclength scales dead loads only; hold the support still or use -continuation load");
+  for (const Constraint &c : scene.constraints)
+    if (c.motion.moves())
+      throw SceneError(
+          "constraint '" + c.name +
+          "' moves: -continuation arclength scales dead loads only; hold it still or use -continuation load");
   const bool weight = !scene.gravity.isZero(0) &&
                       std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &rod) { return rod.gravity; });
   if (!weight && scene.rotation.angular_velocity.isZero(0) && scene.forces.empty() && scene.moments.empty())

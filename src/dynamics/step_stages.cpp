@@ -10,7 +10,7 @@ namespace tendril {
 PetscErrorCode TimeLoop::solveStages(const State &start, const Step &step, NewtonReport *report) {
   PetscFunctionBeginUser;
   IncrementalPotential &potential = solver_.potential();
-  const bool dissipates = potential.scene().stiffnessDissipates();
+  const bool dissipates = potential.scene().strainsDissipate();
   stages_.clear();
   actions_.clear();
   solver_.on_block = [&](RodSet rods) { noteActions(start, rods); };
@@ -36,7 +36,7 @@ PetscErrorCode TimeLoop::solveStages(const State &start, const Step &step, Newto
     stages_.push_back(potential.stageRates(rule));
     more = integrator_->goesOn(start, stages_, iterations);
     if (dissipates && (more || !integrator_->endsAtStage()))
-      stages_.back().strains = strainsOf(potential.elements(), potential.iterate());
+      stages_.back().strains = strainsOf(potential.scene(), potential.elements(), potential.iterate());
   }
   if (!integrator_->endsAtStage() && !potential.moveOn(step.time, integrator_->end(start, step.dt, stages_))) {
     report->converged = false;
@@ -45,12 +45,11 @@ PetscErrorCode TimeLoop::solveStages(const State &start, const Step &step, Newto
   PetscFunctionReturn(0);
 }
 
-/// What the moving supports of some rods do at the stage just solved.
+/// What moving supports and constraints of some rods do at the stage just solved.
 void TimeLoop::noteActions(const State &start, RodSet rods) {
   for (std::size_t k = 0; k < moving_.size(); ++k) {
-    const int rod = solver_.potential().scene().supports[moving_[k]].rod;
-    if (rod < rods.begin || rod >= rods.end) continue;
-    const std::array<Vec3, 2> action = solver_.potential().supportAction(start, moving_[k]);
+    if (moving_[k].rod < rods.begin || moving_[k].rod >= rods.end) continue;
+    const std::array<Vec3, 2> action = solver_.potential().actionOf(moving_[k], start);
     std::copy(action.begin(), action.end(), actions_.back().begin() + 2 * k);
   }
 }
@@ -64,7 +63,7 @@ Work TimeLoop::dynamicWork(const State &start, double h) const {
   if (moving_.empty()) return work;
   const std::vector<double> weights = integrator_->forceWeights(start, h, actions_.size());
   const std::size_t n = actions_.back().size();
-  SupportActions mean(n, Vec3::Zero());
+  HolderActions mean(n, Vec3::Zero());
   for (std::size_t j = 0; j < weights.size(); ++j)
     for (std::size_t k = 0; k < n; ++k) {
       const std::size_t past = (j - actions_.size()) * n + k;
@@ -81,12 +80,11 @@ Work TimeLoop::dynamicWork(const State &start, double h) const {
 double TimeLoop::movedKinetic(const State &state) const {
   const IncrementalPotential &potential = solver_.potential();
   double sum = 0;
-  for (const int s : moving_) {
-    const Support &support = potential.scene().supports[s];
-    const RodRange &rod = potential.elements().rods[support.rod];
-    if (support.holdsPosition())
-      sum += 0.5 * potential.elements().mass()[rod.slot(support.vertex)] *
-             state.velocity[rod.first_vertex + support.vertex].squaredNorm();
+  for (const Holder &h : moving_) {
+    const RodRange &rod = potential.elements().rods[h.rod];
+    if (h.support && h.support->holdsPosition())
+      sum += 0.5 * potential.elements().mass()[rod.slot(h.support->vertex)] *
+             state.velocity[rod.first_vertex + h.support->vertex].squaredNorm();
   }
   return sum;
 }
@@ -95,9 +93,9 @@ double TimeLoop::movedKinetic(const State &state) const {
 void TimeLoop::finishStages(State &state, double h) {
   const IncrementalPotential &potential = solver_.potential();
   const Scene &scene = potential.scene();
-  const bool keeps = integrator_->remembersStrains() > 0 && scene.stiffnessDissipates();
+  const bool keeps = integrator_->remembersStrains() > 0 && scene.strainsDissipate();
   if (keeps) {
-    std::vector<double> before = strainsOf(potential.elements(), potential.start());
+    std::vector<double> before = strainsOf(potential.scene(), potential.elements(), potential.start());
     if (integrator_->remembersStrains() > 1)
       before.insert(before.end(), state.strains.begin(),
                     state.strains.begin() + std::min(before.size(), state.strains.size()));

@@ -77,7 +77,7 @@ PetscErrorCode TimeLoop::attempt(const State &state, State *next, Attempt *now) 
     if (settings_.dynamic) noteActions(state, rods);
     for (int r = rods.begin; r < rods.end; ++r) now->addEnergy(potential, *next, r);
   };
-  actions_.assign(1, SupportActions(2 * moving_.size()));
+  actions_.assign(1, HolderActions(2 * moving_.size()));
   std::optional<Guess> guess;
   if (mode_) guess = alongMode(state, now->step);
   PetscCall(solver_.solve(state, now->step, &now->report, Seek::minimum, guess ? &*guess : nullptr));
@@ -181,7 +181,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
       energy += solver_.potential().energyBudget(state, start, settings_.dynamic ? 1 : state.time, r);
     control.energy = energy.total();
   }
-  moving_ = movingSupports(scene);
+  moving_ = movingHolders(scene);
   Work work;                     // since the last row
   int rejected = 0, in_vain = 0; // steps since then, and their iterations
   State next = state; // what the blocks that have converged come to; the state itself stays as it is until all have

@@ -69,8 +69,8 @@ public:
                                            : assemble<Measure::angle>(configuration, rod, hessian, out);
   }
 
-  Vec3 momentOn(const Configuration &configuration, int rod, int frame) const override {
-    return tendril::momentOn(elements_, cells_, configuration, rod, frame);
+  std::array<Vec3, 2> actionFrom(int slot, const Configuration &configuration, int rod) const override {
+    return {Vec3::Zero(), momentOn(elements_, cells_, configuration, rod, slot)};
   }
 
 private:

@@ -1,8 +1,10 @@
 #include "tendril/energy/cell.hpp"
 
+#include "tendril/energy/constraint.hpp"
+
 namespace tendril {
 
-std::vector<double> strainsOf(const Elements &elements, const Configuration &c) {
+std::vector<double> strainsOf(const Scene &scene, const Elements &elements, const Configuration &c) {
   const std::size_t row = strainRow(elements);
   std::vector<double> strains(4 * row, 0.0);
   for (const int s : elements.edge_slot) strains[s] = c[Configuration::strain][s];
@@ -11,6 +13,13 @@ std::vector<double> strainsOf(const Elements &elements, const Configuration &c) 
       const std::array<T, 3> s = presentStrain<T>(elements, c, r, cell, count);
       for (int k = 0; k < 3; ++k) write(strains.data() + (k + 1) * row + cell.slot, s[k]);
     });
+  for (std::size_t n = 0; n < scene.constraints.size(); ++n) {
+    const Constraint &constraint = scene.constraints[n];
+    const int slot = elements.constraint_slot[n];
+    const Mat3 m = dampedStrain(elements, constraint, slot, restLengthOf(elements, constraint.rod), c);
+    for (int j = 0; j < constraint.slots(); ++j)
+      for (int k = 0; k < 3; ++k) strains[(k + 1) * row + slot + j] = m(k, j);
+  }
   return strains;
 }
 

@@ -83,9 +83,11 @@ RodStrains rodStrains(const Scene &scene, const Elements &elements, const State 
 RodActions rodActions(const Scene &scene, const Elements &elements, const State &state, double motion_time,
                       double load_factor) {
   const Configuration c = configurationOf(state, scene, elements, motion_time);
-  RodActions out{std::vector<Vec3>(state.director.size()), std::vector<Vec3>(state.position.size(), Vec3::Zero()),
-                 std::vector<Vec3>(scene.supports.size(), Vec3::Zero()),
-                 std::vector<Vec3>(scene.supports.size(), Vec3::Zero())};
+  RodActions out;
+  out.force.resize(state.director.size());
+  out.moment.assign(state.position.size(), Vec3::Zero());
+  out.reaction.assign(scene.supports.size(), Vec3::Zero());
+  out.reaction_moment = out.reaction;
   for (std::size_t r = 0; r < elements.rods.size(); ++r) {
     const RodRange &rod = elements.rods[r];
     for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
@@ -100,11 +102,20 @@ RodActions rodActions(const Scene &scene, const Elements &elements, const State 
           stretchGradient(f, axial, strainSlope(elements.energy[r], f.length, elements.inverseRestLength()[slot]));
     }
   }
+  for (std::size_t k = 0; k < scene.constraints.size(); ++k)
+    out.constraint.push_back(readConstraint(scene, elements, int(k), state, c));
   // A couple acts by a pair of forces on the ends of its edge, which is not a force in the rod.
   for (const EdgeMoment &m : scene.moments) {
     const int i = elements.rods[m.rod].first_edge + m.edge;
     const Frame f = c.frameAt(elements.edge_slot[i]);
     out.force[i] -= load_factor / f.length * m.moment.cross(f.tangent);
+  }
+  for (std::size_t k = 0; k < scene.constraints.size(); ++k) {
+    const Constraint &constraint = scene.constraints[k];
+    if (constraint.isPin()) continue;
+    const int i = elements.rods[constraint.rod].first_edge + constraint.at;
+    const Frame f = c.frameAt(elements.edge_slot[i]);
+    out.force[i] -= out.constraint[k].moment.cross(f.tangent) / f.length;
   }
   eachCell(
       elements, c,

@@ -27,6 +27,7 @@ public:
   }
 
   bool isLoad() const override { return true; }
+  bool couplesPositions() const override { return turns_; }
 
   void beginStep(const State &, const Configuration &start, const Step &step, int rod) override {
     start_ = &start;

@@ -4,8 +4,8 @@
 
 namespace tendril {
 
-std::vector<std::unique_ptr<Term>> makeTerms(const Scene &scene, const Elements &elements, const AxialLaw &axial,
-                                             bool dynamic) {
+std::vector<std::unique_ptr<Term>> makeRodTerms(const Scene &scene, const Elements &elements, const AxialLaw &axial,
+                                                bool dynamic) {
   std::vector<std::unique_ptr<Term>> terms;
   const bool heavy = !scene.gravity.isZero(0) &&
                      std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &r) { return r.gravity; });
@@ -51,24 +51,8 @@ EnergyBudget &EnergyBudget::operator+=(const EnergyBudget &other) {
   bend += other.bend;
   twist += other.twist;
   gravity += other.gravity;
+  constraint += other.constraint;
   return *this;
-}
-
-EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, const Configuration &c,
-                          double load_factor, int r) {
-  const AxialLaw axial(scene, elements);
-  EnergyBudget budget;
-  for (const auto &term : makeTerms(scene, elements, axial, true)) term->addEnergies(state, c, load_factor, r, budget);
-  return budget;
-}
-
-EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, double load_factor) {
-  const AxialLaw axial(scene, elements);
-  const Configuration c = configurationOf(state, scene, elements, state.time);
-  EnergyBudget budget;
-  for (const auto &term : makeTerms(scene, elements, axial, true))
-    for (int r = 0; r < int(elements.rods.size()); ++r) term->addEnergies(state, c, load_factor, r, budget);
-  return budget;
 }
 
 } // namespace tendril

@@ -20,11 +20,15 @@ double weightPotential(const Scene &scene, const Elements &elements, const Confi
   return sum;
 }
 
-SupportActions staticActions(const Scene &scene, const Elements &elements, const State &state,
-                             const std::vector<int> &moving) {
+HolderActions staticActions(const Scene &scene, const Elements &elements, const State &state,
+                            const std::vector<Holder> &moving) {
   const RodActions actions = rodActions(scene, elements, state, state.time, state.time);
-  SupportActions out;
-  for (const int s : moving) out.insert(out.end(), {actions.reaction[s], actions.reaction_moment[s]});
+  HolderActions out;
+  for (const Holder &h : moving)
+    if (h.support)
+      out.insert(out.end(), {actions.reaction[h.index], actions.reaction_moment[h.index]});
+    else
+      out.insert(out.end(), {actions.constraint[h.index].force, actions.constraint[h.index].moment});
   return out;
 }
 
@@ -63,22 +67,24 @@ double workOfLoads(const Scene &scene, const Elements &elements, const Configura
   return sum;
 }
 
-std::vector<int> movingSupports(const Scene &scene) {
-  std::vector<int> moving;
-  for (std::size_t s = 0; s < scene.supports.size(); ++s)
-    if (scene.supports[s].motion.moves()) moving.push_back(int(s));
+std::vector<Holder> movingHolders(const Scene &scene) {
+  std::vector<Holder> moving;
+  for (const Support &s : scene.supports)
+    if (s.motion.moves()) moving.push_back({s.rod, &s.motion, &s, nullptr, int(&s - scene.supports.data())});
+  for (const Constraint &c : scene.constraints)
+    if (c.motion.moves()) moving.push_back({c.rod, &c.motion, nullptr, &c, int(&c - scene.constraints.data())});
   return moving;
 }
 
 double workOfSupports(const Scene &scene, const Elements &elements, const Configuration &start,
-                      const Configuration &end, double from, double to, const SupportActions &actions) {
+                      const Configuration &end, double from, double to, const HolderActions &actions) {
   double sum = 0;
   std::size_t next = 0;
-  for (const int s : movingSupports(scene)) {
-    const Support &support = scene.supports[s];
+  for (const Holder &h : movingHolders(scene)) {
     const Vec3 &force = actions[next++], &moment = actions[next++];
-    sum += force.dot(end.displacementAt(elements.rods[support.rod].slot(support.vertex), start)) +
-           moment.dot(support.motion.turnBetween(from, to));
+    const Vec3 moved = h.support ? end.displacementAt(elements.rods[h.rod].slot(h.support->vertex), start)
+                                 : Vec3(h.motion->displacementAt(to) - h.motion->displacementAt(from));
+    sum += force.dot(moved) + moment.dot(h.motion->turnBetween(from, to));
   }
   return sum;
 }
@@ -86,10 +92,10 @@ double workOfSupports(const Scene &scene, const Elements &elements, const Config
 Work staticWork(const Scene &scene, const Elements &elements, const State &before, const State &after,
                 const Configuration &start, const Configuration &end) {
   Work work{workOfLoads(scene, elements, start, end, before.time, after.time), 0};
-  const std::vector<int> moving = movingSupports(scene);
+  const std::vector<Holder> moving = movingHolders(scene);
   if (moving.empty()) return work;
-  SupportActions mean = staticActions(scene, elements, before, moving);
-  const SupportActions last = staticActions(scene, elements, after, moving);
+  HolderActions mean = staticActions(scene, elements, before, moving);
+  const HolderActions last = staticActions(scene, elements, after, moving);
   for (std::size_t k = 0; k < mean.size(); ++k) mean[k] = 0.5 * (mean[k] + last[k]);
   work.supports = workOfSupports(scene, elements, start, end, before.time, after.time, mean);
   return work;

@@ -14,10 +14,13 @@ namespace {
 void requireHeld(const Scene &scene) {
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
     const bool held = std::any_of(scene.supports.begin(), scene.supports.end(),
-                                  [&](const Support &s) { return s.rod == int(r) && s.holdsPosition(); });
+                                  [&](const Support &s) { return s.rod == int(r) && s.holdsPosition(); }) ||
+                      std::any_of(scene.constraints.begin(), scene.constraints.end(),
+                                  [&](const Constraint &c) { return c.rod == int(r) && c.isPin(); });
     if (!held)
-      throw SceneError("rod '" + scene.rods[r].name +
-                       "' is free to move as a whole: -mode static needs a clamp or pins that hold every rod");
+      throw SceneError(
+          "rod '" + scene.rods[r].name +
+          "' is free to move as a whole: -mode static needs a clamp, pins or constraints that hold every rod");
   }
 }
 

@@ -29,17 +29,30 @@ std::string textOf(const Material &m) {
          textOf(m.mass_damping_coefficient) + " and " + textOf(m.stiffness_damping_coefficient);
 }
 
+std::string textOf(const Motion &m) {
+  if (m.table.empty())
+    return m.moves() ? ", velocity " + textOf(m.velocity) + ", angular velocity " + textOf(m.angular_velocity) : "";
+  std::string table;
+  for (const Motion::Key &k : m.table) table += textOf(k.time) + textOf(k.displacement) + textOf(k.rotation);
+  return ", motion by a table of " + std::to_string(m.table.size()) + " rows, #" + hashOf(table);
+}
+
 std::string textOf(const Support &support) {
   std::string text = nameOf(support.kind);
   if (support.holdsTwist())
     text += " of tangent " + textOf(support.frame.tangent) + " and director " + textOf(support.frame.director);
-  const Motion &m = support.motion;
-  if (m.table.empty())
-    return m.moves() ? text + ", velocity " + textOf(m.velocity) + ", angular velocity " + textOf(m.angular_velocity)
-                     : text;
-  std::string table;
-  for (const Motion::Key &k : m.table) table += textOf(k.time) + textOf(k.displacement) + textOf(k.rotation);
-  return text + ", motion by a table of " + std::to_string(m.table.size()) + " rows, #" + hashOf(table);
+  return text + textOf(support.motion);
+}
+
+std::string textOf(const Constraint &c) {
+  std::string text =
+      c.isPin() ? "pin to " + textOf(c.point)
+                : "rotation to tangent " + textOf(c.frame.tangent) + " and director " + textOf(c.frame.director);
+  text += ", stiffness " + textOf(c.stiffness) + ", damping " + textOf(c.damping);
+  if (c.damping != 0 && !c.damps_motion) text += " of the rod's motion alone";
+  if (c.saturation > 0) text += ", saturation " + textOf(c.saturation);
+  if (c.measure == Constraint::Measure::sine) text += ", measure sine";
+  return text + textOf(c.motion);
 }
 
 using Kind = RunFacts::Kind;
@@ -176,6 +189,8 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
     return std::string(what) + std::to_string(place) + " of rod '" + scene.rods[rod].name + "'";
   };
   for (const Support &s : scene.supports) add(Kind::scene, at("support at vertex ", s.vertex, s.rod), textOf(s));
+  for (const Constraint &c : scene.constraints)
+    add(Kind::scene, at(c.isPin() ? "constraint at vertex " : "constraint at edge ", c.at, c.rod), textOf(c));
   for (const NodalForce &f : scene.forces) add(Kind::load, at("force on vertex ", f.vertex, f.rod), textOf(f.force));
   for (const EdgeMoment &m : scene.moments) {
     if (m.torque != 0) add(Kind::load, at("torque on edge ", m.edge, m.rod), textOf(m.torque));

@@ -285,6 +285,8 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
   if (out.scene.rods.empty()) map.at("rods").fail("a scene needs at least one rod");
   if (map.has("supports"))
     for (const YamlValue &v : map.at("supports").items()) readSupport(v, out);
+  if (map.has("constraints"))
+    for (const YamlValue &v : map.at("constraints").items()) readConstraint(v, out);
   if (map.has("loads"))
     for (const YamlValue &v : map.at("loads").items()) readLoad(v, out);
   map.finish();

@@ -1,6 +1,7 @@
 #include "tendril/io/summary.hpp"
 
 #include "tendril/energy/widest_angle.hpp"
+#include "tendril/io/text.hpp"
 
 #include <iomanip>
 #include <limits>
@@ -54,6 +55,15 @@ Summary summarize(const Scene &scene, const Elements &elements, const State &sta
     out.total_moment +=
         state.position[elements.rods[support.rod].first_vertex + support.vertex].cross(out.force[s]) + out.moment[s];
   }
+  for (std::size_t k = 0; k < scene.constraints.size(); ++k) {
+    const ConstraintReading &c = actions.constraint[k];
+    const Constraint &constraint = scene.constraints[k];
+    out.constraint.push_back(c);
+    out.total_force += c.force;
+    if (constraint.isPin())
+      out.total_moment += state.position[elements.rods[constraint.rod].first_vertex + constraint.at].cross(c.force);
+    out.total_moment += c.moment;
+  }
   return out;
 }
 
@@ -80,7 +90,7 @@ std::vector<std::string> describe(const Summary &s, const Scene &scene) {
   mass << std::setprecision(5) << s.mass << " kg";
   row("mass", mass.str(), "centre " + textOf(s.centre_of_mass, "m"));
   const char *name = "reactions";
-  if (scene.supports.size() > 1)
+  if (scene.supports.size() + scene.constraints.size() > 1)
     row(std::exchange(name, ""),
         textOf(s.total_force, "N") + " in all; about the origin " + textOf(s.total_moment, "N m"), "");
   for (std::size_t k = 0; k < scene.supports.size() && scene.supports.size() <= most_supports_told; ++k) {
@@ -90,6 +100,17 @@ std::vector<std::string> describe(const Summary &s, const Scene &scene) {
     row(std::exchange(name, ""),
         what + ": " + nameOf(support.kind) + " at vertex " + std::to_string(support.vertex) + " of rod '" +
             scene.rods[std::size_t(support.rod)].name + "'",
+        "");
+  }
+  for (std::size_t k = 0; k < scene.constraints.size() && scene.constraints.size() <= most_supports_told; ++k) {
+    const Constraint &c = scene.constraints[k];
+    row(std::exchange(name, ""),
+        (c.isPin() ? textOf(s.constraint[k].force, "N") + ": pin '"
+                   : textOf(s.constraint[k].moment, "N m") + ": rotation '") +
+            inOneLine(c.name) + "' " + (c.isPin() ? "at vertex " : "on edge ") + std::to_string(c.at) + " of rod '" +
+            scene.rods[std::size_t(c.rod)].name + "', " +
+            (c.isPin() ? textOf(s.constraint[k].distance, "m") + " off"
+                       : textOf(s.constraint[k].rotation, "rad") + " off"),
         "");
   }
   return lines;

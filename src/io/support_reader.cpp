@@ -11,9 +11,6 @@ Vec3 unit(const YamlValue &value) {
   return v.normalized();
 }
 
-namespace {
-
-/// Rods a support or load speaks of: a name, a number, or `all`.
 std::vector<int> readTargets(YamlMap &map, KeyOf<KeyType::rod> key, const RodNames &rods) {
   if (!map.has(*key)) {
     if (rods.count() > 1) map.value().fail("say which 'rod' is meant: a name, a number from 0, or all");
@@ -38,17 +35,16 @@ int readIndex(YamlMap &map, KeyOf<KeyType::index> key, int count, const std::str
   return i;
 }
 
-Motion readMotion(const YamlValue &value) {
-  YamlMap map(value, "supports[].motion");
+Motion readMotion(const YamlValue &value, const MotionKeys &keys) {
+  YamlMap map(value, keys.motion);
   Motion m;
-  m.velocity = map.vector("supports[].motion.velocity");
-  m.angular_velocity = map.vector("supports[].motion.angular_velocity");
-  const bool steady = map.has("supports[].motion.velocity") || map.has("supports[].motion.angular_velocity"),
-             table = map.has("supports[].motion.table");
+  m.velocity = map.vector(keys.velocity);
+  m.angular_velocity = map.vector(keys.angular_velocity);
+  const bool steady = map.has(*keys.velocity) || map.has(*keys.angular_velocity), table = map.has(*keys.table);
   if (!steady && !table) value.fail("'motion' needs 'velocity' and/or 'angular_velocity', or a 'table'");
   if (table) {
     if (steady) value.fail("'motion' takes a 'table' or velocities, not both");
-    for (const YamlValue &row : map.at("supports[].motion.table").items()) {
+    for (const YamlValue &row : map.at(*keys.table).items()) {
       const std::size_t n = row.node().size();
       if (n != 4 && n != 7) row.fail("a row of 'table' is [time, dx, dy, dz] or [time, dx, dy, dz, rx, ry, rz]");
       const std::vector<double> v = row.numbers(n);
@@ -62,6 +58,22 @@ Motion readMotion(const YamlValue &value) {
   map.finish();
   return m;
 }
+
+void refuseTurning(const YamlValue &motion, const Motion &m, const std::string &advice) {
+  const bool turns = std::any_of(m.table.begin(), m.table.end(), [](const auto &k) { return !k.rotation.isZero(0); });
+  if (turns || !m.angular_velocity.isZero(0)) motion.fail(advice);
+}
+
+void refuseTravel(const YamlValue &motion, const Motion &m, const std::string &advice) {
+  const bool moves =
+      std::any_of(m.table.begin(), m.table.end(), [](const auto &k) { return !k.displacement.isZero(0); });
+  if (moves || !m.velocity.isZero(0)) motion.fail(advice);
+}
+
+namespace {
+
+constexpr MotionKeys motion_keys{"supports[].motion", "supports[].motion.velocity",
+                                 "supports[].motion.angular_velocity", "supports[].motion.table"};
 
 /// A motion that is elsewhere at the start than the rod as drawn.
 std::string jumpOf(const Motion &motion, const std::string &rod) {
@@ -114,14 +126,12 @@ void readSupport(const YamlValue &value, SceneFile &out) {
       value.fail("rod '" + rod.name + "' has no flexural stiffness and no twist to fix");
     if (map.has("supports[].motion")) {
       const YamlValue motion = map.at("supports[].motion");
-      s.motion = readMotion(motion);
-      const auto turns = [](const Motion::Key &k) { return !k.rotation.isZero(0); };
-      const auto travels = [](const Motion::Key &k) { return !k.displacement.isZero(0); };
-      const auto &table = s.motion.table;
-      if (type == "pin" && (!s.motion.angular_velocity.isZero(0) || std::any_of(table.begin(), table.end(), turns)))
-        motion.fail("a pin holds no rotation; take it away or write 'type: clamp'");
-      if (type == "fix_twist" && (!s.motion.velocity.isZero(0) || std::any_of(table.begin(), table.end(), travels)))
-        motion.fail("fix_twist holds no position; take the displacement away or add a pin that moves");
+      s.motion = readMotion(motion, motion_keys);
+      if (type == "pin")
+        refuseTurning(motion, s.motion, "a pin holds no rotation; take it away or write 'type: clamp'");
+      if (type == "fix_twist")
+        refuseTravel(motion, s.motion,
+                     "fix_twist holds no position; take the displacement away or add a pin that moves");
     }
     if (const std::string jump = jumpOf(s.motion, rod.name); !jump.empty() && !warned) {
       out.notes.push_back("warning: " + value.place() + ": " + jump);

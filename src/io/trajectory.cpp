@@ -13,14 +13,15 @@
 namespace tendril {
 namespace {
 
-enum class On { vertices, edges, cells, supports };
-constexpr const char *places[] = {"vertices", "edges", "cells", "supports"};
+enum class On { vertices, edges, cells, supports, constraints };
+constexpr const char *places[] = {"vertices", "edges", "cells", "supports", "constraints"};
 
 /// A frame about to be written: a state and what is derived from it, as far as some field needs it.
 struct Snapshot {
   const State &state;
   RodStrains strains;
   RodActions actions;
+  std::vector<double> constraint_deviation = {}, constraint_force = {};
 };
 enum class From { state, second_word, strains, actions };
 
@@ -52,6 +53,11 @@ const Field fields[] = {
     {"reaction", "N", On::supports, 3, From::actions, [](const Snapshot &s) { return s.actions.reaction[0].data(); }},
     {"reaction_moment", "N m", On::supports, 3, From::actions,
      [](const Snapshot &s) { return s.actions.reaction_moment[0].data(); }},
+    // Of pins the first three numbers, of rotations the last three.
+    {"constraint_deviation", "m, rad", On::constraints, 6, From::actions,
+     [](const Snapshot &s) { return s.constraint_deviation.data(); }},
+    {"constraint_force", "N, N m", On::constraints, 6, From::actions,
+     [](const Snapshot &s) { return s.constraint_force.data(); }},
 };
 
 std::vector<std::string> namesOf(bool derived) {
@@ -64,8 +70,8 @@ std::vector<std::string> namesOf(bool derived) {
 constexpr auto patience = std::chrono::milliseconds(500); ///< how long rows and frames may wait
 constexpr std::size_t most_waiting = 4 << 20;             ///< [bytes]
 
-std::array<int, 4> sizes(const Elements &e) {
-  return {e.vertices(), e.edges(), int(e.cell_slot.size()), int(e.support_slot.size())};
+std::array<int, 5> sizes(const Elements &e) {
+  return {e.vertices(), e.edges(), int(e.cell_slot.size()), int(e.support_slot.size()), int(e.constraint_slot.size())};
 }
 
 } // namespace
@@ -99,7 +105,7 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
         std::find(elements.measure.begin(), elements.measure.end(), Measure::angle) == elements.measure.end())
       continue;
     std::vector<hsize_t> slab{hsize_t(sizes(elements)[std::size_t(f.place)])};
-    if (slab[0] == 0) continue; // cables have no cells, free rods no supports
+    if (slab[0] == 0) continue; // cables have no cells, free rods no supports or constraints
     if (f.components > 1) slab.push_back(f.components);
     state_.back() = std::make_unique<Hdf5Series>(file_, std::string("state/") + f.name, slab);
     file_.writeAttribute(std::string("state/") + f.name, "unit", std::string(f.unit));
@@ -156,6 +162,12 @@ void TrajectoryWriter::writeFrame(const State &state) {
     snapshot.strains = rodStrains(scene_, elements_, state, state.time, dynamic_ ? 1 : state.time);
   if (wanted(From::actions))
     snapshot.actions = rodActions(scene_, elements_, state, state.time, dynamic_ ? 1 : state.time);
+  for (const ConstraintReading &c : snapshot.actions.constraint) {
+    for (const Vec3 *x : {&c.distance, &c.rotation})
+      snapshot.constraint_deviation.insert(snapshot.constraint_deviation.end(), x->data(), x->data() + 3);
+    for (const Vec3 *x : {&c.force, &c.moment})
+      snapshot.constraint_force.insert(snapshot.constraint_force.end(), x->data(), x->data() + 3);
+  }
   for (std::size_t k = 0; k < state_.size(); ++k)
     if (state_[k]) state_[k]->append(fields[k].data(snapshot));
   const double step = double(state.step);
@@ -254,7 +266,9 @@ std::string TrajectoryWriter::xdmfFrame(bool edges) const {
   out << "    </Attribute>\n";
   for (std::size_t k = 1; k < state_.size(); ++k) {
     const Field &f = fields[k];
-    if (!state_[k] || f.place == On::cells || f.place == On::supports || (f.place == On::edges && !edges)) continue;
+    if (!state_[k] || f.place == On::cells || f.place == On::supports || f.place == On::constraints ||
+        (f.place == On::edges && !edges))
+      continue;
     if (f.components != 2)
       attribute(f);
     else

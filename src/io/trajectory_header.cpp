@@ -63,6 +63,7 @@ void TrajectoryWriter::writeHeader(const Scene &scene, const Elements &elements,
   file_.write("reference/radius", {hsize_t(vertices_)}, radius.data(), "m");
   writeRods();
   writeSupports();
+  writeConstraints();
   writeMaterials();
 }
 
@@ -115,6 +116,24 @@ void TrajectoryWriter::writeSupports() {
   file_.createGroup("supports");
   file_.write("supports/vertex", {vertices.size()}, vertices.data());
   file_.write("supports/type", types);
+}
+
+void TrajectoryWriter::writeConstraints() {
+  if (scene_.constraints.empty()) return;
+  std::vector<int> rods, places;
+  std::vector<std::string> names, types;
+  for (const Constraint &c : scene_.constraints) {
+    const RodRange &rod = elements_.rods[c.rod];
+    names.push_back(c.name);
+    types.push_back(nameOf(c.kind));
+    rods.push_back(c.rod);
+    places.push_back((c.isPin() ? rod.first_vertex : rod.first_edge) + c.at);
+  }
+  file_.createGroup("constraints");
+  file_.write("constraints/name", names);
+  file_.write("constraints/type", types);
+  file_.write("constraints/rod", {rods.size()}, rods.data());
+  file_.write("constraints/place", {places.size()}, places.data());
 }
 
 void TrajectoryWriter::writeMaterials() {

@@ -78,15 +78,17 @@ PetscErrorCode DofMap::setUp(const Scene &scene) {
   rods_.clear();
   unknown_begin_.clear();
   vertices_ = edges_ = 0;
-  std::vector<int> along(scene.rods.size(), 0); // supports that are not at ends
+  std::vector<int> along(scene.rods.size(), 0); // slots of supports that are not at ends, and of constraints
   for (const Support &s : scene.supports)
-    if (scene.rods[s.rod].edgeBefore(s.vertex) >= 0 && scene.rods[s.rod].edgeAfter(s.vertex) >= 0) ++along[s.rod];
+    if (scene.rods[s.rod].edgeBefore(s.vertex) >= 0 && scene.rods[s.rod].edgeAfter(s.vertex) >= 0)
+      along[s.rod] += 3; // a frame and two cells
+  for (const Constraint &c : scene.constraints) along[c.rod] += c.slots();
   slots_ = lanes; // room for the frame before the first rod
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
     const Rod &rod = scene.rods[r];
-    // A pack between the slots behind the last vertex and what follows, so that no pack holds parts of both; a frame
-    // and two cells of each support along the rod; and a slot before the next rod.
-    const int slots = Planes::planeStride(rod.vertices() + RodRange::behind + 3 * along[r] + 1);
+    // A pack between the slots behind the last vertex and what follows, so that no pack holds parts of both; and a slot
+    // before the next rod.
+    const int slots = Planes::planeStride(rod.vertices() + RodRange::behind + along[r] + 1);
     rods_.push_back(
         {vertices_, rod.vertices(), edges_, rod.edges(), slots_, slots, !rod.material.isCable(), rod.closed});
     vertices_ += rod.vertices();

@@ -1,5 +1,7 @@
 #include "tendril/layout/elements.hpp"
 
+#include <algorithm>
+
 namespace tendril {
 namespace {
 
@@ -48,6 +50,9 @@ public:
       if (holder && after >= 0) addHalfCell(v, after, *holder, false);
     }
   }
+
+  /// Behind the slots of supports along the rod.
+  int freeSlot() const { return next_; }
 
   /// Couples on the end edges of ends that are free to turn.
   void addEndCouples(const Scene &scene, int rod) {
@@ -138,6 +143,7 @@ private:
 Elements::Elements(const Scene &scene, const DofMap &dofs)
     : rods(dofs.rods()), slots(dofs.slots()), loose(rods.size()), end_couples(rods.size()),
       support_slot(scene.supports.size(), -1), rod_cells{0} {
+  std::vector<int> free_slots; ///< per rod, behind those of its supports
   constants_ = Planes(7, slots);
   cells_ = Planes(cell_planes, slots);
   for (const int plane : {1, 2}) std::fill_n(constants_[plane], slots, 1.0);
@@ -168,11 +174,34 @@ Elements::Elements(const Scene &scene, const DofMap &dofs)
       CellBuilder builder(scene, int(r), *this);
       builder.build();
       if (!scene.moments.empty()) builder.addEndCouples(scene, int(r));
+      free_slots.push_back(builder.freeSlot());
     } else {
+      free_slots.push_back(range.looseSlot());
       cell_begin.push_back(range.first_slot);
       cell_end.push_back(range.first_slot);
     }
     rod_cells.push_back(int(cell_slot.size()));
+  }
+  if (!scene.constraints.empty()) placeConstraints(scene, std::move(free_slots));
+}
+
+/// Slots behind those of supports along a rod.
+void Elements::placeConstraints(const Scene &scene, std::vector<int> free_slots) {
+  constraints_.resize(rods.size());
+  pins_.resize(rods.size());
+  for (std::size_t k = 0; k < scene.constraints.size(); ++k) {
+    const Constraint &c = scene.constraints[k];
+    constraint_slot.push_back(free_slots[c.rod]);
+    free_slots[c.rod] += c.slots();
+    constraints_[c.rod].push_back(int(k));
+    if (!c.isPin()) continue;
+    const int slot = rods[c.rod].slot(c.at);
+    Pins &pins = pins_[c.rod];
+    const auto place = std::lower_bound(pins.begin(), pins.end(), std::pair(slot, 0.0));
+    if (place != pins.end() && place->first == slot)
+      place->second += c.stiffness;
+    else
+      pins.insert(place, {slot, c.stiffness});
   }
 }
 

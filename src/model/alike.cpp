@@ -20,6 +20,16 @@ bool same(const EdgeMoment &a, const EdgeMoment &b) {
   return a.edge == b.edge && a.torque == b.torque && a.moment == b.moment;
 }
 
+/// Places that are given by the scene stand in the world; others go with the rod.
+bool same(const Constraint &a, const Constraint &b) {
+  const bool same_place = a.isPin() ? !a.place_given && !b.place_given
+                                    : (a.frame.tangent - b.frame.tangent).norm() < rounding &&
+                                          (a.frame.director - b.frame.director).norm() < rounding;
+  return a.kind == b.kind && a.at == b.at && a.motion == b.motion && a.stiffness == b.stiffness &&
+         a.damping == b.damping && a.saturation == b.saturation && a.measure == b.measure &&
+         a.damps_motion == b.damps_motion && a.place_given == b.place_given && same_place;
+}
+
 bool sameShape(const Rod &a, const Drawing &drawing_a, const Rod &b, const Drawing &drawing_b) {
   if (a.position.size() != b.position.size() || a.closed != b.closed ||
       bool(drawing_a.curve) != bool(drawing_b.curve) || drawing_a.directors_given != drawing_b.directors_given)
@@ -57,6 +67,7 @@ template <class Item> void keep(const std::vector<Item> &from, const std::vector
 std::vector<int> firstAlike(const Scene &scene, const std::vector<Drawing> &drawings) {
   const std::size_t rods = scene.rods.size();
   const auto supports = byRod(scene.supports, rods);
+  const auto constraints = byRod(scene.constraints, rods);
   const auto forces = byRod(scene.forces, rods);
   const auto moments = byRod(scene.moments, rods);
   auto alike = [&](int r, int s) {
@@ -64,7 +75,8 @@ std::vector<int> firstAlike(const Scene &scene, const std::vector<Drawing> &draw
     return a.material == b.material && a.measure == b.measure && a.energy == b.energy && a.gravity == b.gravity &&
            a.natural == b.natural && a.natural_strain == b.natural_strain && a.initial_velocity == b.initial_velocity &&
            a.initial_turns == b.initial_turns && sameShape(a, drawings[r], b, drawings[s]) &&
-           sameList(supports[r], supports[s]) && sameList(forces[r], forces[s]) && sameList(moments[r], moments[s]);
+           sameList(supports[r], supports[s]) && sameList(constraints[r], constraints[s]) &&
+           sameList(forces[r], forces[s]) && sameList(moments[r], moments[s]);
   };
   std::vector<int> first, kinds;
   for (int s = 0; s < int(rods); ++s) {
@@ -87,6 +99,7 @@ Scene withRods(const Scene &scene, const std::vector<int> &rods) {
     out.rods.push_back(scene.rods[r]);
   }
   keep(scene.supports, place, out.supports);
+  keep(scene.constraints, place, out.constraints);
   keep(scene.forces, place, out.forces);
   keep(scene.moments, place, out.moments);
   return out;

@@ -131,14 +131,31 @@ void addCouple(const Scene &written, const Drawing &drawing, const EdgeMoment &c
     if (weights[k] != 0) add(wrapped(first + k, edges), weights[k]);
 }
 
-/// Vertices that supports and loads name, without the ends of a rod and the first of a closed one: those are vertices
-/// of any number of edges.
+/// Edge on whose middle that of an edge of the scene lies; the last edges of an open rod are those at its ends.
+int movedEdge(const Rod &written, const Drawing &drawing, int edge, int edges) {
+  if (!written.closed && edge == 0) return 0;
+  if (!written.closed && edge + 1 == written.edges()) return edges - 1;
+  const double parameter = (edge + 0.5) / written.edges(),
+               place = (drawing.grading ? drawing.grading->placeOf(parameter) : parameter) * edges - 0.5;
+  const int found = int(std::lround(place));
+  if (std::abs(place - found) > 1e-6)
+    throw SceneError("rod '" + written.name + "': a constraint turns its edge " + std::to_string(edge) + " of " +
+                     std::to_string(written.edges()) + ", whose middle is no middle of " + std::to_string(edges) +
+                     " edges; take an odd multiple of " + std::to_string(written.edges()) +
+                     ", or constrain an edge at an end");
+  return found;
+}
+
+/// Vertices that supports, constraints and loads name, without the ends of a rod and the first of a closed one: those
+/// are vertices of any number of edges.
 std::vector<int> namedVertices(const Scene &scene, int r) {
   std::vector<int> named;
   auto add = [&](int rod, int vertex) {
     if (rod == r && vertex > 0 && vertex < scene.rods[r].edges()) named.push_back(vertex);
   };
   for (const Support &s : scene.supports) add(s.rod, s.vertex);
+  for (const Constraint &c : scene.constraints)
+    if (c.isPin()) add(c.rod, c.at);
   for (const NodalForce &f : scene.forces) add(f.rod, f.vertex);
   return named;
 }
@@ -275,6 +292,16 @@ Scene redraw(const Scene &written, const std::vector<Drawing> &drawings, const s
     if (!s.tangent_given) s.frame.tangent = f.tangent;
     if (!s.director_given) s.frame.director = f.director;
     s.frame.director = orthonormalised(s.frame.director, s.frame.tangent);
+  }
+  for (const Constraint &constraint : written.constraints) {
+    Constraint &c = scene.constraints.emplace_back(constraint);
+    const Rod &rod = scene.rods[c.rod], &before = written.rods[c.rod];
+    if (!isRedrawn(before, drawings[c.rod], edges[c.rod])) continue;
+    c.at = c.isPin() ? movedVertex(before, drawings[c.rod], c.at, edges[c.rod])
+                     : movedEdge(before, drawings[c.rod], c.at, edges[c.rod]);
+    if (c.place_given) continue;
+    c.point = c.isPin() ? rod.position[c.at] : c.point;
+    c.frame = c.isPin() ? c.frame : referenceFrame(rod, c.at);
   }
   for (const NodalForce &f : written.forces)
     scene.forces.push_back({f.rod, movedVertex(written.rods[f.rod], drawings[f.rod], f.vertex, edges[f.rod]), f.force});

@@ -49,6 +49,22 @@ Mat3 Motion::rotationAt(double time) const {
   return Eigen::AngleAxisd(angle, r / angle).toRotationMatrix();
 }
 
+/// Jl(r) dr/dt of the rotation vector r, Jl the left Jacobian of the exponential map.
+Vec3 Motion::angularVelocityAt(double time) const {
+  if (table.empty()) return angular_velocity;
+  for (std::size_t k = 1; k < table.size(); ++k)
+    if (table[k - 1].time < time && time <= table[k].time) {
+      const Vec3 r = rotationVectorAt(time),
+                 rate = (table[k].rotation - table[k - 1].rotation) / (table[k].time - table[k - 1].time);
+      const double angle = r.norm();
+      if (angle < 1e-8) return rate;
+      const Vec3 axis = r / angle;
+      const double sine = std::sin(angle) / angle, cosine = (1 - std::cos(angle)) / angle;
+      return sine * rate + (1 - sine) * axis * axis.dot(rate) + cosine * axis.cross(rate);
+    }
+  return Vec3::Zero();
+}
+
 Vec3 Motion::turnBetween(double from, double to) const {
   const int parts = 1 + int(2 * (rotationVectorAt(to) - rotationVectorAt(from)).norm());
   Vec3 sum = Vec3::Zero();
@@ -68,9 +84,16 @@ std::string shortText(double value) {
   return s.str();
 }
 
-bool Scene::stiffnessDissipates() const {
+double Rod::length() const {
+  double sum = 0;
+  for (int i = 0; i < edges(); ++i) sum += edge(i).norm();
+  return sum;
+}
+
+bool Scene::strainsDissipate() const {
   return std::any_of(rods.begin(), rods.end(),
-                     [](const Rod &rod) { return rod.material.stiffness_damping_coefficient != 0; });
+                     [](const Rod &rod) { return rod.material.stiffness_damping_coefficient != 0; }) ||
+         std::any_of(constraints.begin(), constraints.end(), [](const Constraint &c) { return c.damping != 0; });
 }
 
 void setBishopDirectors(Rod &rod, const Vec3 &start) {
@@ -197,6 +220,8 @@ DimensionlessGroups dimensionlessGroups(const Rod &rod, const Vec3 &gravity) {
   }
   return g;
 }
+
+const char *nameOf(Constraint::Kind kind) { return kind == Constraint::Kind::pin ? "pin" : "rotation"; }
 
 const char *nameOf(Support::Kind kind) {
   switch (kind) {

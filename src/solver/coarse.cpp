@@ -23,6 +23,8 @@ std::vector<int> keptVertices(const IncrementalPotential &fine, int r) {
   stays.front() = stays.back() = true;
   for (const Support &s : scene.supports)
     if (s.rod == r) stays[s.vertex] = true;
+  for (const Constraint &c : scene.constraints)
+    if (c.rod == r && c.isPin()) stays[c.at] = true;
   for (const NodalForce &f : scene.forces)
     if (f.rod == r) stays[f.vertex] = true;
   auto between = [](const Frame &a, const Frame &b) {
@@ -94,6 +96,12 @@ struct Coarse {
         s.vertex = at(s.rod, s.vertex);
         s.rod -= rods.begin;
         scene.supports.push_back(s);
+      }
+    for (Constraint c : from.constraints)
+      if (isHere(c.rod)) {
+        c.at = at(c.rod, c.at);
+        c.rod -= rods.begin;
+        scene.constraints.push_back(c);
       }
     for (const NodalForce &f : from.forces)
       if (isHere(f.rod)) scene.forces.push_back({f.rod - rods.begin, at(f.rod, f.vertex), f.force});

@@ -94,6 +94,7 @@ IncrementalPotential::RodEnergy IncrementalPotential::rodEnergy(const Configurat
     result.size += std::abs(energy);
     result.noise +=
         64 * epsilon * std::abs(energy) + delta * (std::sqrt(2 * std::abs(energy) * bending) + bending * delta);
+    result.noise += term->noise(c, r, blur);
   }
   if (!std::isfinite(result.value)) result = {};
   return result;
@@ -262,10 +263,16 @@ Residual IncrementalPotential::residual() {
   return worst;
 }
 
-std::array<Vec3, 2> IncrementalPotential::supportAction(const State &start, int s) {
-  const Support &support = scene_.supports[s];
+std::array<Vec3, 2> IncrementalPotential::actionOf(const Holder &holder, const State &start) {
   std::array<Vec3, 2> action{Vec3::Zero(), Vec3::Zero()};
-  if (support.holdsPosition()) {
+  const int slot = holder.support ? elements_.support_slot[holder.index] : elements_.constraint_slot[holder.index];
+  for (const auto &term : terms_) {
+    if (slot < 0) break;
+    const std::array<Vec3, 2> of_term = term->actionFrom(slot, iterate_, holder.rod);
+    for (int k : {0, 1}) action[k] += of_term[k];
+  }
+  if (holder.support && holder.support->holdsPosition()) {
+    const Support &support = *holder.support;
     const int slot = elements_.rods[support.rod].slot(support.vertex),
               v = elements_.rods[support.rod].first_vertex + support.vertex;
     const Vec3 moved = iterate_.displacementAt(slot, start_);
@@ -281,8 +288,6 @@ std::array<Vec3, 2> IncrementalPotential::supportAction(const State &start, int 
     action[0] =
         gradient(support.rod).equilibrium.vector(0, slot) + elements_.mass()[slot] * (alpha * astray - acceleration);
   }
-  if (const int frame = elements_.support_slot[s]; frame >= 0)
-    for (const auto &term : terms_) action[1] += term->momentOn(iterate_, support.rod, frame);
   return action;
 }
 
@@ -329,7 +334,7 @@ bool IncrementalPotential::moveOn(double time, const StageRule &end) {
     for (int s = rod.first_slot; s < rod.edgeEnd(); ++s)
       iterate_[C::axial_force][s] = elements_.axialStiffness()[s] * iterate_[C::strain][s];
   }
-  return !supports_.beyondBarrier();
+  return supports_.beyondBarrier().empty();
 }
 
 } // namespace tendril

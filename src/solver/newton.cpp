@@ -296,9 +296,8 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
         potential_->setAxialForces(r, guess->axial_force[0]);
   } else if (!is_static)
     predict(start);
-  if (potential_->beyondBarrier())
-    failure = "a support turns past the barrier of measure tan at 180 degrees of twist per vertex; use more edges, or "
-              "measure: angle";
+  if (const std::string &barrier = potential_->beyondBarrier(); !barrier.empty())
+    failure = barrier;
   else
     PetscCall(newton(&failure));
   // In statics the answer must be a minimum, and the Hessian there says how far from it the iterate still is.

@@ -44,6 +44,8 @@ std::vector<RodScale> rodScales(const Scene &scene, const Elements &elements) {
     }
     for (int n = elements.rod_cells[r]; n < elements.rod_cells[r + 1]; ++n)
       for (int k = 0; k < 3; ++k) scale.bending += elements.cells()[cell_stiffness + k][elements.cell_slot[n]];
+    for (const int k : elements.constraintsOf(int(r)))
+      (scene.constraints[k].isPin() ? scale.pinning : scale.turning) += scene.constraints[k].stiffness;
     scale.load = loadOn(scene, int(r), scale.length);
     scales.push_back(scale);
   }
@@ -88,8 +90,9 @@ Residual residualOf(const Elements &elements, const Material &m, const Step &ste
   // Edges carry errors of epsilon in their strains and directions, which the stiffnesses turn into forces and moments.
   const double strain_noise = edgeError(reach, scale.shortest_edge), count = std::sqrt(double(rod.vertices));
   const double bending = steepness *
-                         std::max({m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness}) /
-                         scale.shortest_edge;
+                             std::max({m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness}) /
+                             scale.shortest_edge +
+                         scale.turning;
   const double unit = scale.force, stretching = step.mixed ? hmax(tension) : hmax(tension) + m.axial_stiffness;
   Residual result;
   result.force = std::sqrt(force) / unit;
@@ -97,7 +100,7 @@ Residual residualOf(const Elements &elements, const Material &m, const Step &ste
   result.compatibility = step.mixed ? hmax(error) : 0;
   // Inertia turns an error of position or twist into a force or a moment, which counts in short steps.
   const double inertia = step.isStatic() ? 0 : scale.longest_edge / (step.dt * step.dt),
-               heavy = m.linear_density * scale.shortest_edge * inertia,
+               heavy = m.linear_density * scale.shortest_edge * inertia + scale.pinning * scale.shortest_edge,
                spinning = m.linear_rotational_inertia * inertia;
   result.force_floor =
       4 * count * strain_noise * (stretching + heavy + (m.isCable() ? 0 : bending / scale.shortest_edge)) / unit;

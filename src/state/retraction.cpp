@@ -39,28 +39,38 @@ void Retraction::setInverseTimeSquared(double value) {
             1e-8 * elements_.axialStiffness()[rod.slot(i)] * elements_.inverseRestLength()[rod.slot(i)];
     for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
       soft[s] = elements_.freedom()[s] / (soft[s] + elements_.mass()[s] * value);
-    stiffenNearHeld(rod);
+    stiffenNearHeld(rod, elements_.pinsOf(int(&rod - elements_.rods.data())));
   }
 }
 
 /// Corrections must not kink the rod where a held vertex stands still beside vertices that move: between two held
 /// vertices, at distances a and b, the softness is multiplied by (4ab/(a + b)^2)^2, which leaves position and direction
-/// at both as they are.
-void Retraction::stiffenNearHeld(const RodRange &rod) {
+/// at both as they are. A vertex that a pin makes q times as soft is held but for q: the factor f becomes q + (1 - q)
+/// f, q linear from one to the other.
+void Retraction::stiffenNearHeld(const RodRange &rod, const Elements::Pins &pins) {
   double *soft = work_[softness];
   const double *freedom = elements_.freedom(), *length = elements_.restLength();
-  std::vector<int> held;
-  for (int i = 0; i < rod.vertices; ++i)
-    if (freedom[rod.slot(i)] == 0) held.push_back(i);
+  std::vector<std::pair<int, double>> held; // with q
+  auto pin = pins.begin();
+  for (int i = 0; i < rod.vertices; ++i) {
+    if (freedom[rod.slot(i)] == 0) held.emplace_back(i, 0.0);
+    if (pin == pins.end() || pin->first != rod.slot(i)) continue;
+    const double softer = 1 / (1 + soft[rod.slot(i)] * (pin++)->second);
+    held.emplace_back(i, softer);
+    soft[rod.slot(i)] *= softer;
+  }
   if (held.empty()) return;
-  if (rod.closed) held.push_back(held.front() + rod.vertices);
+  if (rod.closed) held.emplace_back(held.front().first + rod.vertices, held.front().second);
   for (std::size_t k = 0; k + 1 < held.size(); ++k) {
     auto slot = [&](int i) { return rod.slot(i % rod.vertices); };
+    const auto [begin, q0] = held[k];
+    const auto [end, q1] = held[k + 1];
     double span = 0, a = 0;
-    for (int i = held[k]; i < held[k + 1]; ++i) span += length[slot(i)];
-    for (int i = held[k] + 1; i < held[k + 1]; ++i) {
+    for (int i = begin; i < end; ++i) span += length[slot(i)];
+    for (int i = begin + 1; i < end; ++i) {
       a += length[slot(i - 1)];
-      soft[slot(i)] *= std::pow(4 * a * (span - a) / (span * span), 2);
+      const double q = q0 + (q1 - q0) * (a / span);
+      soft[slot(i)] *= q + (1 - q) * std::pow(4 * a * (span - a) / (span * span), 2);
     }
   }
 }
@@ -130,6 +140,11 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
       if (first < 0) first = s;
       last = s;
     }
+  const Elements::Pins &pins = elements_.pinsOf(r);
+  if (first < 0 && !pins.empty()) {
+    projectSpan(rod, rod.first_slot, rod.edgeEnd(), to);
+    return true;
+  }
   if (first < 0) { // a free rod keeps the mass-weighted mean of the additive update
     const double *mass = elements_.mass();
     Vec3 before = Vec3::Zero(), after = Vec3::Zero();
@@ -144,9 +159,14 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
     moveAll(total > 0 ? Vec3((before - after) / total) : Vec3::Zero());
     return true;
   }
-  for (int s = first; s > rod.first_slot; --s) step(s, s - 1, s - 1, -1);
-  for (int s = last; s + 1 < rod.vertexEnd(); ++s) step(s, s, s + 1, 1);
+  // Ends that hang from the first and the last of them, by chains; with pins they are spans, too.
+  const bool first_hangs = pins.empty() || pins.front().first > first,
+             last_hangs = pins.empty() || pins.back().first < last;
+  for (int s = first; first_hangs && s > rod.first_slot; --s) step(s, s - 1, s - 1, -1);
+  for (int s = last; last_hangs && s + 1 < rod.vertexEnd(); ++s) step(s, s, s + 1, 1);
   moveAll(Vec3::Zero());
+  if (!first_hangs) projectSpan(rod, rod.first_slot, first, to);
+  if (!last_hangs) projectSpan(rod, last, rod.edgeEnd(), to);
   for (int s = first; s < last;) {
     int end = s + 1;
     while (freedom[end] != 0) ++end;

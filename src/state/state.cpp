@@ -22,6 +22,10 @@ void Configuration::copyEnds(const Elements &elements, int r, const Configuratio
   copySlots(from, rod.vertexEnd() - 1, rod.vertexEnd());
   for (const LooseCell &cell : elements.loose[r])
     for (const int slot : {cell.slot, cell.frame0, cell.frame1}) copySlots(from, slot, slot + 1);
+  for (const int k : elements.constraintsOf(r)) {
+    const int slot = elements.constraint_slot[k];
+    copySlots(from, slot, slot + 1);
+  }
 }
 
 void Configuration::copyRod(const Elements &elements, int r, const Configuration &from) {
@@ -82,6 +86,19 @@ void setSupports(const Scene &scene, const Elements &elements, double motion_tim
   for (std::size_t s = 0; s < scene.supports.size(); ++s)
     if (elements.support_slot[s] >= 0)
       c.setFrame(elements.support_slot[s], supportFrame(scene.supports[s], motion_time));
+  setTargets(scene, elements, motion_time, c);
+}
+
+void setTarget(const Constraint &constraint, int slot, double motion_time, Configuration &c) {
+  if (constraint.isPin())
+    c.setPosition(slot, constraint.pointAt(motion_time), Vec3::Zero());
+  else
+    c.setFrame(slot, constraint.frameAt(motion_time));
+}
+
+void setTargets(const Scene &scene, const Elements &elements, double motion_time, Configuration &c) {
+  for (std::size_t k = 0; k < scene.constraints.size(); ++k)
+    setTarget(scene.constraints[k], elements.constraint_slot[k], motion_time, c);
 }
 
 [[gnu::flatten]] void setRod(const State &state, const Elements &elements, int r, Configuration &c) {

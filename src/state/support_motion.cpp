@@ -1,5 +1,7 @@
 #include "tendril/state/support_motion.hpp"
 
+#include "tendril/geometry/rotation.hpp"
+
 #include <limits>
 
 namespace tendril {
@@ -12,10 +14,17 @@ SupportMotion::SupportMotion(const Scene &scene, const DofMap &dofs, const Eleme
     : scene_(scene), dofs_(dofs), elements_(elements), moving_(elements.rods.size()), turned_(elements.rods.size()) {
   for (std::size_t s = 0; s < scene.supports.size(); ++s)
     if (scene.supports[s].motion.moves()) moving_[scene.supports[s].rod].push_back(int(s));
+  for (std::size_t k = 0; k < scene.constraints.size(); ++k)
+    if (scene.constraints[k].motion.moves()) {
+      moving_targets_.resize(elements.rods.size());
+      moving_targets_[scene.constraints[k].rod].push_back(int(k));
+    }
 }
 
 void SupportMotion::turn(const Configuration &from, double from_time, double to_time) {
-  beyond_barrier_ = false;
+  beyond_barrier_.clear();
+  from_time_ = from_time;
+  to_time_ = to_time;
   for (std::size_t r = 0; r < moving_.size(); ++r) {
     turned_[r].clear();
     for (const int s : moving_[r]) {
@@ -36,7 +45,29 @@ void SupportMotion::turn(const Configuration &from, double from_time, double to_
   }
 }
 
+/// In parts of less than half a radian, so that none passes half a turn unseen.
+void SupportMotion::followTarget(int k, Configuration &iterate) {
+  const Constraint &c = scene_.constraints[k];
+  const int slot = elements_.constraint_slot[k];
+  const Motion &motion = c.motion;
+  const bool jumps = !c.isPin() && c.measure == Constraint::Measure::angle;
+  const int parts =
+      jumps ? 1 + int(2 * (motion.rotationVectorAt(to_time_) - motion.rotationVectorAt(from_time_)).norm()) : 0;
+  const Frame edge = iterate.frameAt(elements_.rods[c.rod].slot(c.at));
+  Vec3 before = jumps ? rotationBetween(iterate.frameAt(slot), edge) : Vec3(Vec3::Zero());
+  for (int p = 1; p <= parts; ++p) {
+    const Vec3 now = rotationBetween(c.frameAt(from_time_ + (to_time_ - from_time_) * p / parts), edge);
+    if (jumpsBetween(before, now))
+      beyond_barrier_ = "constraint '" + c.name +
+                        "' is turned by more than half a turn from its edge; take shorter steps, or measure: sine";
+    before = now;
+  }
+  setTarget(c, slot, to_time_, iterate);
+}
+
 void SupportMotion::follow(int r, Configuration &iterate) {
+  if (!moving_targets_.empty())
+    for (const int k : moving_targets_[r]) followTarget(k, iterate);
   if (turned_[r].empty()) return;
   for (const Turned &turned : turned_[r]) iterate.setFrame(turned.slot, turned.end);
   auto turning = [&](int frame) {
@@ -52,7 +83,10 @@ void SupportMotion::follow(int r, Configuration &iterate) {
       const double principal = halfAngleBetween(iterate.frameAt(cell.frame0), iterate.frameAt(cell.frame1)).angle();
       turns = 2 * pi * std::round((expected - principal) / (2 * pi));
       twist = principal + turns;
-      beyond_barrier_ = beyond_barrier_ || (elements_.measure[r] == Measure::tan && turns != 0);
+      if (elements_.measure[r] == Measure::tan && turns != 0)
+        beyond_barrier_ =
+            "a support turns past the barrier of measure tan at 180 degrees of twist per vertex; use more "
+            "edges, or measure: angle";
     }
   });
 }

@@ -97,6 +97,29 @@ std::vector<Case> cases() {
     s.gravity = Vec3(0, 3, -9);
     s.rods[0].material.linear_rotational_inertia = 0.02;
   });
+  auto constrained = [](Scene &s, Constraint::Measure measure) {
+    const Frame f = referenceFrame(s.rods[0], 6);
+    const Vec3 axis = Vec3(0.3, -0.5, 0.4);
+    const Mat3 turn = Eigen::AngleAxisd(1.1, axis.normalized()).toRotationMatrix();
+    s.constraints = {pinTo(s, 0, 4, Vec3(0.05, 0.1, -0.1), 30), pinTo(s, 0, 10, Vec3(0.2, -0.1, 0.1), 20),
+                     pinTo(s, 0, 10, Vec3(0.1, 0.2, 0.1), 20),
+                     turnTo(0, 6, {turn * f.tangent, turn * f.director, 1}, 2)};
+    s.constraints[1].saturation = 0.05; // beyond
+    s.constraints[2].saturation = 5;    // below
+    s.constraints[3].measure = measure;
+    if (measure == Constraint::Measure::angle) s.constraints[3].saturation = 2;
+  };
+  add("constraints", false, [&](Scene &s) { constrained(s, Constraint::Measure::angle); });
+  add("constraints by the sine", false, [&](Scene &s) { constrained(s, Constraint::Measure::sine); });
+  add("constraints that dissipate and move", true, [&](Scene &s) {
+    moving(s);
+    constrained(s, Constraint::Measure::angle);
+    for (Constraint &c : s.constraints) c.damping = 2;
+    s.constraints[0].motion.velocity = Vec3(1, 0, -1);
+    s.constraints[1].damps_motion = s.constraints[3].damps_motion = false;
+    s.constraints[1].motion.velocity = Vec3(0, 1, 0);
+    s.constraints[3].motion.angular_velocity = Vec3(2, 1, -1);
+  });
   add("a cable", true, [](Scene &s) {
     s.rods[0].material.flexural_stiffness = {0, 0};
     s.supports = {hold(s, 0, 0, Support::Kind::pin)};

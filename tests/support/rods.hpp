@@ -32,6 +32,27 @@ inline Support hold(const Scene &scene, int rod, int vertex, Support::Kind kind)
   return {kind, rod, vertex, {}, frameAtVertex(scene.rods[rod], vertex)};
 }
 
+inline Constraint constraintOn(int rod, int at, Constraint::Kind kind, double stiffness) {
+  Constraint c{};
+  c.kind = kind;
+  c.rod = rod;
+  c.at = at;
+  c.name = "constraint";
+  c.stiffness = stiffness;
+  return c;
+}
+/// \param off from the vertex as drawn
+inline Constraint pinTo(const Scene &scene, int rod, int vertex, const Vec3 &off, double stiffness) {
+  Constraint c = constraintOn(rod, vertex, Constraint::Kind::pin, stiffness);
+  c.point = scene.rods[rod].position[vertex] + off;
+  return c;
+}
+inline Constraint turnTo(int rod, int edge, const Frame &frame, double stiffness) {
+  Constraint c = constraintOn(rod, edge, Constraint::Kind::rotation, stiffness);
+  c.frame = frame;
+  return c;
+}
+
 /// Scene of one rod, without gravity, clamped at its first vertex.
 inline Scene clampedScene(Rod rod) {
   Scene scene;

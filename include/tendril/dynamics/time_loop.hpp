@@ -73,11 +73,11 @@ private:
   LoopSettings settings_;
   std::string failure_;
   std::unique_ptr<Integrator> integrator_;
-  Integrator::Stages stages_;           ///< of the step under way
-  double located_ = -1;                 ///< last critical load factor
-  std::optional<Planes> mode_;          ///< critical mode along which the next step begins
-  std::vector<int> moving_;             ///< supports
-  std::vector<SupportActions> actions_; ///< of those, at each stage of the step under way
+  Integrator::Stages stages_;          ///< of the step under way
+  double located_ = -1;                ///< last critical load factor
+  std::optional<Planes> mode_;         ///< critical mode along which the next step begins
+  std::vector<Holder> moving_;         ///< supports and constraints
+  std::vector<HolderActions> actions_; ///< of those, at each stage of the step under way
 
   /// Error of the step under way, and what it moved: the largest of any rod, root mean square over its length [turns in
   /// rad].

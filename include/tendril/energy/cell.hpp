@@ -46,8 +46,8 @@ std::array<T, 3> presentStrain(const Elements &elements, const Configuration &co
 }
 
 /// Strains of a configuration: a row over slots of the edges' axial ones, and three of the cells', each with room for a
-/// pack behind.
-std::vector<double> strainsOf(const Elements &elements, const Configuration &c);
+/// pack behind. Those that constraints damp (dampedStrain) are in the rows of the cells, by columns at their slots.
+std::vector<double> strainsOf(const Scene &scene, const Elements &elements, const Configuration &c);
 inline std::size_t strainRow(const Elements &elements) { return std::size_t(elements.slots) + lanes; }
 
 } // namespace tendril

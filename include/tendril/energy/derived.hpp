@@ -3,7 +3,7 @@
 /// Strains and internal forces and moments of a state, for output: nothing here takes part in a step. docs/theory.md
 /// derives the balances.
 
-#include "tendril/state/state.hpp"
+#include "tendril/energy/constraint.hpp"
 
 namespace tendril {
 
@@ -32,6 +32,7 @@ struct RodActions {
   std::vector<Vec3> reaction;
   /// (ns) The moment that goes with it, about its vertex: of clamps and of `fix_twist`; zero for pins [N m].
   std::vector<Vec3> reaction_moment;
+  std::vector<ConstraintReading> constraint; ///< (nc)
 };
 /// With forces F and couples C, at an equilibrium and whatever the edge length: force(i) = force(i+1) + F(i+1) and
 /// moment(i) = moment(i+1) + e(i) x force(i) + C(i).

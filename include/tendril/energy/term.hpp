@@ -45,8 +45,8 @@ struct Derivatives {
 
 /// Stored and kinetic energies of a state, by name [J]; centrifugal potential counts as gravity.
 struct EnergyBudget {
-  double kinetic = 0, stretch = 0, bend = 0, twist = 0, gravity = 0;
-  double total() const { return kinetic + stretch + bend + twist + gravity; }
+  double kinetic = 0, stretch = 0, bend = 0, twist = 0, gravity = 0, constraint = 0;
+  double total() const { return kinetic + stretch + bend + twist + gravity + constraint; }
   EnergyBudget &operator+=(const EnergyBudget &other);
 };
 class Term {
@@ -61,6 +61,9 @@ public:
   virtual void setLoadFactor(double /*factor*/) {}
   /// Whether it is the scene's loads.
   virtual bool isLoad() const { return false; }
+  /// Whether its Hessian couples the coordinates of one vertex other than through edges: see
+  /// BandedSystem::coupled_positions.
+  virtual bool couplesPositions() const { return false; }
   /// [J], up to a constant of the step. Not finite where the configuration is impossible.
   virtual double energy(const Configuration &configuration, int rod) const = 0;
   /// Adds gradient and Hessian, pulled back by the retraction at the configuration.
@@ -69,13 +72,17 @@ public:
   /// Adds what of it a state stores, without dissipation, under its names.
   virtual void addEnergies(const State & /*state*/, const Configuration & /*of the state*/, double /*load_factor*/,
                            int /*rod*/, EnergyBudget & /*out*/) const {}
-  /// Derivative of the energy by turning the frame of a support, at its slot, about axes fixed in space [N m].
-  virtual Vec3 momentOn(const Configuration & /*configuration*/, int /*rod*/, int /*frame*/) const {
-    return Vec3::Zero();
+  /// How far rounding blurs the energy, beyond that of its value and of strains [J]. \param blur of an edge over its
+  /// length
+  virtual double noise(const Configuration & /*configuration*/, int /*rod*/, double /*blur*/) const { return 0; }
+  /// What holds a rod from a slot of its own, the frame of a support or the target of a constraint, does to it:
+  /// derivatives of the energy by moving it [N], and by turning it about axes fixed in space [N m].
+  virtual std::array<Vec3, 2> actionFrom(int /*slot*/, const Configuration & /*configuration*/, int /*rod*/) const {
+    return {Vec3::Zero(), Vec3::Zero()};
   }
 };
 
-/// The same of the half cells beside a frame. \param cells their constants, as Elements::cells()
+/// Moment of the half cells beside a frame by turning it [N m]. \param cells their constants, as Elements::cells()
 Vec3 momentOn(const Elements &elements, const Planes &cells, const Configuration &configuration, int rod, int frame);
 
 /// Strain around which dissipation by stiffness pulls: that at the start, with what the stage remembers.
@@ -103,9 +110,9 @@ private:
   bool moved_ = false; ///< some step had rest strains of its own
 };
 
-/// The terms that the scene needs, in a fixed order; stretch is the first.
-std::vector<std::unique_ptr<Term>> makeTerms(const Scene &scene, const Elements &elements, const AxialLaw &axial,
-                                             bool dynamic);
+/// The terms of the rods themselves that the scene needs, in a fixed order; stretch is the first.
+std::vector<std::unique_ptr<Term>> makeRodTerms(const Scene &scene, const Elements &elements, const AxialLaw &axial,
+                                                bool dynamic);
 
 std::unique_ptr<Term> makeBendTwist(const Scene &, const Elements &);
 std::unique_ptr<Term> makeStretch(const Elements &, const AxialLaw &);
@@ -117,11 +124,5 @@ std::unique_ptr<Term> makeLoad(const Scene &, const Elements &);
 /// balance of forces is the same with or without it.
 std::array<double, 3> endEnergy(const Elements &elements, const Configuration &configuration, const EndCouple &end,
                                 double load_factor);
-
-/// The energies of a state, from the terms of its scene (for tests and single questions: makes them anew).
-EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state,
-                          const Configuration &configuration, double load_factor, int rod);
-/// Of all rods.
-EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state, double load_factor);
 
 } // namespace tendril

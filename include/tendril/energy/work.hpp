@@ -27,13 +27,22 @@ double coupleWork(const Vec3 &moment, double torque, const Vec3 &from, const Vec
 double workOfLoads(const Scene &scene, const Elements &elements, const Configuration &start, const Configuration &end,
                    double factor_start, double factor_end);
 
-/// What supports that move do to their rods, in the order of movingSupports: force [N], then moment about the vertex [N
-/// m] of each. The inertia of the held vertex itself is not in it: what it takes is the change of its kinetic energy.
-using SupportActions = std::vector<Vec3>;
-std::vector<int> movingSupports(const Scene &scene);
+/// What supports and constraints that move do to their rods, in the order of movingHolders: force [N], then moment
+/// about the vertex [N m] of each. The inertia of a held vertex itself is not in it: what it takes is the change of its
+/// kinetic energy.
+using HolderActions = std::vector<Vec3>;
+/// Supports and constraints in one numbering, supports first.
+struct Holder {
+  int rod;
+  const Motion *motion;
+  const Support *support;       ///< or null
+  const Constraint *constraint; ///< or null
+  int index;                    ///< among its kind
+};
+std::vector<Holder> movingHolders(const Scene &scene);
 /// Work of these actions, constant between two times, by the displacements of vertices and the turning of frames [J].
 double workOfSupports(const Scene &scene, const Elements &elements, const Configuration &start,
-                      const Configuration &end, double from, double to, const SupportActions &actions);
+                      const Configuration &end, double from, double to, const HolderActions &actions);
 
 /// Both between two equilibria at the load factors that are their times, by the trapezoidal rule.
 Work staticWork(const Scene &scene, const Elements &elements, const State &before, const State &after,

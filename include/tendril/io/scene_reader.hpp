@@ -6,6 +6,8 @@
 #include "tendril/io/rod_names.hpp"
 #include "tendril/model/redraw.hpp"
 
+#include <set>
+
 namespace tendril {
 
 /// How to run a scene: the `simulation` block of the file, then the options.
@@ -28,7 +30,8 @@ struct SceneFile {
   Scene scene;
   SceneSource source;
   RodNames names;
-  std::vector<Drawing> drawings; ///< per rod
+  std::set<std::string> constraint_names; ///< of blocks
+  std::vector<Drawing> drawings;          ///< per rod
   RunSettings run;
   std::vector<std::string> notes; ///< to be told at the start: defaults of materials, and warnings
 };

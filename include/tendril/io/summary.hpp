@@ -16,15 +16,16 @@ struct Summary {
       if (other > value) *this = {other, r, i};
     }
   };
-  double time = 0;                    ///< in statics the load factor
-  double mass = 0;                    ///< [kg]
-  Vec3 centre_of_mass = Vec3::Zero(); ///< [m]
-  Extreme displacement;               ///< from the place as drawn [m]
-  Extreme tension, compression;       ///< internal force along the tangent [N]
-  Extreme angle;                      ///< turning or twist between the edges at a vertex, cables left out [rad]
-  std::vector<Vec3> force, moment;    ///< (ns) what each support does to its rod, see RodActions [N], [N m]
+  double time = 0;                           ///< in statics the load factor
+  double mass = 0;                           ///< [kg]
+  Vec3 centre_of_mass = Vec3::Zero();        ///< [m]
+  Extreme displacement;                      ///< from the place as drawn [m]
+  Extreme tension, compression;              ///< internal force along the tangent [N]
+  Extreme angle;                             ///< turning or twist between the edges at a vertex, cables left out [rad]
+  std::vector<Vec3> force, moment;           ///< (ns) what each support does to its rod, see RodActions [N], [N m]
+  std::vector<ConstraintReading> constraint; ///< (nc)
   Vec3 total_force = Vec3::Zero(),
-       total_moment = Vec3::Zero(); ///< of all supports, the moment about the origin [N], [N m]
+       total_moment = Vec3::Zero(); ///< of all supports and constraints, the moment about the origin [N], [N m]
 };
 
 /// \param load_factor on the loads of the scene

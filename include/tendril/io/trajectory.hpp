@@ -77,6 +77,7 @@ private:
   void writeOrigin(const Provenance &provenance);
   void writeRods();
   void writeSupports();
+  void writeConstraints(); ///< name, type, rod, and the vertex of a pin or edge of a rotation
   void writeMaterials();
   std::string xdmfFrame(bool edges) const;
   void writeXdmf() const;

@@ -5,6 +5,8 @@
 
 #include "tendril/layout/dof_map.hpp"
 
+#include <span>
+
 namespace tendril {
 
 /// A cell that is not the one between the two edges at its slot: half cells of supports along a rod. Its constants have
@@ -37,6 +39,9 @@ public:
   std::vector<std::vector<LooseCell>> loose;       ///< per rod
   std::vector<std::vector<EndCouple>> end_couples; ///< per rod
   std::vector<int> support_slot;                   ///< of each support's frame, or -1 where nothing meets it
+  std::vector<int> constraint_slot; ///< first of each constraint's slots: that of its target (Constraint::slots)
+  /// Pins of a rod by their vertices' slots, a vertex once: how stiff they hold it [N/m].
+  using Pins = std::vector<std::pair<int, double>>;
 
   // In scene order.
   std::vector<int> vertex0, vertex1; ///< ends of each edge
@@ -53,6 +58,11 @@ public:
   const double *cellLength() const { return constants_[6]; }        ///< Lbar [m]
   /// stiffness, 3 planes; rest, 3; weight, 2; free, 2; base, 1 (CellOf)
   const Planes &cells() const { return cells_; }
+  /// Constraints on a rod, by number, and its pins; empty where the scene has none.
+  std::span<const int> constraintsOf(int rod) const {
+    return constraints_.empty() ? std::span<const int>() : std::span<const int>(constraints_[rod]);
+  }
+  const Pins &pinsOf(int rod) const { return pins_.empty() ? no_pins_ : pins_[rod]; }
   int vertices() const { return int(vertex_slot.size()); }
   int edges() const { return int(edge_slot.size()); }
 
@@ -60,6 +70,10 @@ public:
 
 private:
   Planes constants_, cells_;
+  std::vector<std::vector<int>> constraints_; ///< per rod
+  std::vector<Pins> pins_;                    ///< per rod
+  Pins no_pins_;
+  void placeConstraints(const Scene &scene, std::vector<int> free_slots);
   friend class CellBuilder;
 };
 

@@ -42,6 +42,7 @@ struct Rod {
   int edges() const { return vertices() - (closed ? 0 : 1); }
   int next(int vertex) const { return vertex + 1 == vertices() ? 0 : vertex + 1; }
   Vec3 edge(int i) const { return position[next(i)] - position[i]; }
+  double length() const; ///< of all edges [m]
   /// Edge on the far side of a vertex (towards lower numbers), or -1 at the first vertex of an open rod; and the other
   /// way.
   int edgeBefore(int vertex) const { return vertex > 0 ? vertex - 1 : closed ? edges() - 1 : -1; }
@@ -67,6 +68,7 @@ struct Motion {
   Vec3 velocityAt(double time) const;       ///< where it jumps, that before [m/s]
   Vec3 rotationVectorAt(double time) const; ///< [rad]
   Mat3 rotationAt(double time) const;
+  Vec3 angularVelocityAt(double time) const; ///< where it jumps, that before [rad/s]
   /// Sum of the rotation vectors of its parts between two times, each of less than half a radian: whole turns are
   /// counted [rad].
   Vec3 turnBetween(double from, double to) const;
@@ -88,6 +90,36 @@ struct Support {
 /// As scenes and files of results have it.
 const char *nameOf(Support::Kind kind);
 
+/// A spring with a damper between a rod and the world: `pin` draws a vertex to a point, `rotation` turns the frame of
+/// an edge to a given one. With g the distance of the vertex, or the angle by which the frame is turned, it stores
+/// stiffness/2 g^2; with a saturation s stiffness s (v^2 - v^3/3), v = g/s, until its force is stiffness s at g = s,
+/// and by that force times g from there. The measure `sine` of a rotation stores stiffness (1 - cos g).
+struct Constraint {
+  enum class Kind { pin, rotation } kind;
+  enum class Measure { angle, sine };
+  std::string name;
+  int rod, at;                      ///< vertex of a pin, edge of a rotation
+  Vec3 point;                       ///< of a pin, without its motion [m]
+  Frame frame;                      ///< of a rotation, without its motion; length 1
+  Motion motion;                    ///< of the point, or of the frame
+  double stiffness;                 ///< [N/m] or [N m/rad]
+  double damping = 0;               ///< [N s/m] or [N m s/rad]
+  double saturation = -1;           ///< [m] or [rad]; none where negative
+  Measure measure = Measure::angle; ///< of a rotation
+  bool damps_motion = true;         ///< whether the damper moves with the point or frame, or stands still
+  bool place_given = false;         ///< the point or frame by the scene, otherwise that of the rod as drawn
+
+  bool isPin() const { return kind == Kind::pin; }
+  /// What rows of a trajectory and the rods' own memory need room for, in slots.
+  int slots() const { return isPin() ? 1 : 3; }
+  Vec3 pointAt(double time) const { return point + motion.displacementAt(time); }
+  Frame frameAt(double time) const {
+    const Mat3 turn = motion.rotationAt(time);
+    return {turn * frame.tangent, turn * frame.director, 1};
+  }
+};
+const char *nameOf(Constraint::Kind kind);
+
 /// Dead loads; torques act about the present tangent of their edge, moments are fixed in space.
 struct NodalForce {
   int rod, vertex;
@@ -102,6 +134,7 @@ struct EdgeMoment {
 struct Scene {
   std::vector<Rod> rods;
   std::vector<Support> supports;
+  std::vector<Constraint> constraints;
   std::vector<NodalForce> forces;
   std::vector<EdgeMoment> moments;
   Vec3 gravity{0, -9.81, 0}; ///< [m/s^2]
@@ -116,8 +149,8 @@ struct Scene {
     }
   } rotation;
 
-  /// Whether the stiffness of any rod dissipates.
-  bool stiffnessDissipates() const;
+  /// Whether anything dissipates by the rate of its strains: the stiffness of a rod, or a constraint.
+  bool strainsDissipate() const;
 };
 
 /// Fills the directors of a rod with discrete Bishop frames: `start` (or some normal of the first edge when zero)

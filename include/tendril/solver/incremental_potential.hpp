@@ -3,11 +3,14 @@
 /// The function one implicit step minimises, on the configuration manifold: the terms of the scene, the iterate, and
 /// the moves between iterates. Rods that nothing joins are independent of each other: everything is done rod by rod.
 
+#include "tendril/coupling/couplings.hpp"
+#include "tendril/energy/work.hpp"
 #include "tendril/solver/residual.hpp"
 #include "tendril/state/commit.hpp"
 #include "tendril/state/retraction.hpp"
 #include "tendril/state/support_motion.hpp"
 
+#include <algorithm>
 #include <limits>
 
 namespace tendril {
@@ -37,9 +40,8 @@ public:
   /// state with supports' frames (not yet their positions) moved to the end of the step.
   void beginStep(const State &start, const Step &step);
   void beginRod(const State &start, int rod);
-  /// Whether a support has turned its edge past 180 degrees of twist in one step, where the measure `tan` has its
-  /// barrier.
-  bool beyondBarrier() const { return supports_.beyondBarrier(); }
+  /// See SupportMotion.
+  const std::string &beyondBarrier() const { return supports_.beyondBarrier(); }
   /// Changes the load factor (in statics also the time) of the step under way; the iterate stays.
   void setLoadFactor(double factor);
   const Configuration &iterate() const { return iterate_; }
@@ -83,6 +85,10 @@ public:
   }
   /// Derivatives of one rod with another Hessian than the step's; they stay until the rod moves.
   void assembleRod(int rod, HessianKind hessian);
+  /// Whether any term couples the coordinates of one vertex.
+  bool couplesPositions() const {
+    return std::any_of(terms_.begin(), terms_.end(), [](const auto &term) { return term->couplesPositions(); });
+  }
   const EdgeBlocks &blocks() const { return derivatives_.blocks; }
 
   /// Trial configuration R(iterate, scale x increment) of one rod, with its axial forces; false when impossible.
@@ -125,9 +131,10 @@ public:
   StageRates stageRates(const StageRule &rule) const {
     return tendril::stageRates(elements_, start_, twistReference(), iterate_, step_.dt, rule);
   }
-  /// Force [N] and moment [N m] of a support on its rod at the iterate, without the inertia of the held vertex itself.
+  /// Force [N] and moment [N m] of a support or constraint on its rod at the iterate, without the inertia of a held
+  /// vertex itself.
   /// \param start of the step
-  std::array<Vec3, 2> supportAction(const State &start, int support);
+  std::array<Vec3, 2> actionOf(const Holder &holder, const State &start);
   const Configuration &start() const { return start_; }
   double length(int rod) const { return scales_[rod].length; }              ///< at rest [m]
   double shortestEdge(int rod) const { return scales_[rod].shortest_edge; } ///< at rest [m]

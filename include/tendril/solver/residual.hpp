@@ -11,6 +11,7 @@ namespace tendril {
 struct RodScale {
   double length = 0, shortest_edge = 0, longest_edge = 0; ///< [m]
   double bending = 0;                                     ///< sum of the stiffnesses of its cells [N m]
+  double pinning = 0, turning = 0;                        ///< sums of the stiffnesses of its constraints [N/m], [N m]
   double load = 0;                                        ///< its loads [N], or 0
   double force = 0;                                       ///< what measures its residual in the present step [N]
 };

@@ -33,7 +33,7 @@ private:
   enum Work : int { softness, target, direction, diagonal = direction + 3, upper, right, corner, work_planes };
   Planes work_;
 
-  void stiffenNearHeld(const RodRange &rod);
+  void stiffenNearHeld(const RodRange &rod, const Elements::Pins &pins);
   bool restoreLengths(const Configuration &from, int rod, RetractionKind kind, Configuration &to);
   void projectSpan(const RodRange &rod, int first, int last, Configuration &to);
   bool updateFrames(const Configuration &from, const Planes &increment, double scale, int rod, Configuration &to) const;

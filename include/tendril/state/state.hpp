@@ -33,8 +33,8 @@ struct State {
   std::vector<Rates> memory; ///< what the integrator remembers of steps before
   std::vector<double>
       strains; ///< before the last step, as strainsOf, then before the one before; where the integrator wants them
-  /// What supports that move did at the end of the last step, then of the one before (SupportActions); where the
-  /// integrator wants them.
+  /// What supports and constraints that move did at the end of the last step, then of the one before (HolderActions);
+  /// where the integrator wants them.
   std::vector<Vec3> support_actions;
 
   bool operator==(const State &) const = default;
@@ -98,7 +98,7 @@ public:
 
   /// Copies all of one rod, the frames of its ends and its loose cells included.
   void copyRod(const Elements &elements, int rod, const Configuration &from);
-  /// Copies what a rod has beside its own edges: the frames of supports.
+  /// Copies what a rod has beside its own edges: the frames of supports, the targets of constraints.
   void copyEnds(const Elements &elements, int rod, const Configuration &from);
   /// Moves the window (see Planes).
   void setOrigin(int first_slot) { values_.setOrigin(first_slot); }
@@ -113,12 +113,15 @@ private:
 
 /// Configuration of a state; supports' frames at `motion_time` of their prescribed motion.
 Configuration configurationOf(const State &state, const Scene &scene, const Elements &elements, double motion_time);
-/// Frames of all supports, and all of one rod, into a configuration of that scene.
+/// Frames of all supports with the targets of all constraints, and all of one rod, into a configuration of that scene.
 void setSupports(const Scene &scene, const Elements &elements, double motion_time, Configuration &c);
 void setRod(const State &state, const Elements &elements, int rod, Configuration &c);
 
 /// Present frame of a support.
 Frame supportFrame(const Support &support, double motion_time);
+/// Point or frame of a constraint, its target, into the configuration, at its slot.
+void setTarget(const Constraint &constraint, int slot, double motion_time, Configuration &c);
+void setTargets(const Scene &scene, const Elements &elements, double motion_time, Configuration &c);
 
 /// Visits the cells of a rod: `visit(slot, frame0, frame1, count)`, as Packs of `count` regular cells, then one by one
 /// the loose ones (template argument double). The tail of the last pack has no cells: its constants are zero.

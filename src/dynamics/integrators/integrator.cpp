@@ -38,7 +38,7 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
   step.rule = &rest;
   solver.begin(state, step);
   std::vector<double> before;
-  if (potential.scene().stiffnessDissipates()) {
+  if (potential.scene().strainsDissipate()) {
     const double moment = 1e-3 * h; // long enough for the strains to change by more than their rounding
     Planes back = potential.dofs().makePlanes();
     for (const RodRange &rod : elements.rods) {
@@ -54,7 +54,8 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
     for (int r = 0; r < potential.all().end; ++r)
       possible = potential.tryMove(back, 1, r, RetractionKind::additive, earlier) && possible;
     if (possible) {
-      before = strainsOf(elements, earlier);
+      setTargets(potential.scene(), elements, state.time - moment, earlier);
+      before = strainsOf(potential.scene(), elements, earlier);
       rest.damping_dt = moment;
       rest.damping_past = {{-1, before.data()}};
       solver.begin(state, step);
@@ -108,14 +109,14 @@ std::vector<double> strainsBehind(StepSolver &solver, const State &start, const 
     potential.remainingMotion(potential.all(), moved);
     for (int r = 0; r < potential.all().end; ++r)
       if (!potential.tryMove(moved, 1, r, RetractionKind::additive, there)) return std::vector<double>();
-    return strainsOf(elements, there);
+    return strainsOf(potential.scene(), elements, there);
   };
   std::vector<double> behind = at(0);
   const std::vector<double> before = at(-moment * rule.damping_dt), after = at(moment * rule.damping_dt);
   if (behind.empty() || before.empty() || after.empty()) return {};
   // Differences of the stages' strains instead where both are far apart: there the solution is far from the guess.
   constexpr double far = 0.05; // [rad]
-  const std::vector<double> first = strainsOf(elements, potential.start());
+  const std::vector<double> first = strainsOf(potential.scene(), elements, potential.start());
   for (std::size_t k = 0; k < behind.size(); ++k) {
     double difference = first[k];
     for (const StageRule::PastStrains &past : rule.damping_past)

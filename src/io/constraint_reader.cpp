@@ -1,0 +1,131 @@
+#include "tendril/geometry/rotation.hpp"
+#include "tendril/io/support_reader.hpp"
+#include "tendril/io/text.hpp"
+
+#include <algorithm>
+
+namespace tendril {
+namespace {
+
+constexpr MotionKeys motion_keys{"constraints[].motion", "constraints[].motion.velocity",
+                                 "constraints[].motion.angular_velocity", "constraints[].motion.table"};
+
+double stiffestTurning(const Material &m) {
+  return std::max({m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness});
+}
+
+int closestVertex(const Rod &rod, const Vec3 &point) {
+  auto away = [&](const Vec3 &x) { return (x - point).squaredNorm(); };
+  return int(std::min_element(rod.position.begin(), rod.position.end(),
+                              [&](const Vec3 &a, const Vec3 &b) { return away(a) < away(b); }) -
+             rod.position.begin());
+}
+
+void readPin(YamlMap &map, const Rod &rod, const std::vector<Support> &supports, Constraint &c) {
+  for (const AnyKey key : {AnyKey("constraints[].edge"), AnyKey("constraints[].tangent"),
+                           AnyKey("constraints[].director"), AnyKey("constraints[].measure")})
+    if (map.has(key)) map.at(key).fail("'" + std::string(key->name()) + "' is for 'type: rotation'");
+  c.place_given = map.has("constraints[].point");
+  const bool closest = map.flag("constraints[].closest");
+  if (closest && !c.place_given) map.value().fail("'closest' needs the 'point' whose nearest vertex is meant");
+  if (closest && map.has("constraints[].vertex"))
+    map.at("constraints[].vertex").fail("write 'vertex' or 'closest: true', not both");
+  if (c.place_given) c.point = map.at("constraints[].point").vector();
+  c.at = closest ? closestVertex(rod, c.point) : readIndex(map, "constraints[].vertex", rod.vertices(), rod.name);
+  if (!c.place_given) c.point = rod.position[c.at];
+  for (const Support &s : supports)
+    if (s.rod == c.rod && s.vertex == c.at && s.holdsPosition())
+      map.value().fail("vertex " + std::to_string(c.at) + " of rod '" + rod.name +
+                       "' is held by a support, which a pin cannot move; take one of them away");
+}
+
+void readRotation(YamlMap &map, const Rod &rod, Constraint &c) {
+  for (const AnyKey key :
+       {AnyKey("constraints[].vertex"), AnyKey("constraints[].closest"), AnyKey("constraints[].point")})
+    if (map.has(key)) map.at(key).fail("'" + std::string(key->name()) + "' is for 'type: pin'");
+  if (rod.material.isCable())
+    map.value().fail("rod '" + rod.name + "' has no flexural stiffness and no frames to turn; write 'type: pin'");
+  c.at = readIndex(map, "constraints[].edge", rod.edges(), rod.name);
+  const Frame drawn = referenceFrame(rod, c.at);
+  c.frame = {drawn.tangent, drawn.director, 1};
+  c.place_given = map.has("constraints[].tangent") || map.has("constraints[].director");
+  if (map.has("constraints[].tangent")) {
+    c.frame.tangent = unit(map.at("constraints[].tangent"));
+    c.frame.director =
+        orthonormalised(transport<double>(drawn.director, drawn.tangent, c.frame.tangent), c.frame.tangent);
+  }
+  if (map.has("constraints[].director")) {
+    const YamlValue d = map.at("constraints[].director");
+    c.frame.director = unit(d);
+    if (std::abs(c.frame.director.dot(c.frame.tangent)) > 1e-6)
+      d.fail("'director' is not normal to the tangent of the constraint");
+    c.frame.director = orthonormalised(c.frame.director, c.frame.tangent);
+  } else if (!c.frame.director.allFinite())
+    map.at("constraints[].tangent")
+        .fail("'tangent' points against edge " + std::to_string(c.at) + " of rod '" + rod.name +
+              "'; give a 'director', too");
+  c.measure = map.word("constraints[].measure") == "sine" ? Constraint::Measure::sine : Constraint::Measure::angle;
+  if (c.measure == Constraint::Measure::sine && c.saturation > 0)
+    map.at("constraints[].saturation").fail("'saturation' is for 'measure: angle'");
+  const double angle = rotationBetween(drawn, c.frameAt(0)).norm() * 180 / pi;
+  if (c.measure == Constraint::Measure::angle && angle > 170)
+    map.value().fail("the frame is turned by " + shortText(angle) + " degrees from edge " + std::to_string(c.at) +
+                     " of rod '" + rod.name +
+                     "' as drawn, too near to half a turn; turn it by a 'motion', or write 'measure: sine'");
+}
+
+} // namespace
+
+void readConstraint(const YamlValue &value, SceneFile &out) {
+  Scene &scene = out.scene;
+  YamlMap map(value, "constraints");
+  const std::string type = map.word("constraints[].type");
+  map.word("constraints[].to");
+  const std::vector<int> rods = readTargets(map, "constraints[].rod", out.names);
+  const std::string name = map.has("constraints[].name") ? map.at("constraints[].name").text()
+                                                         : "constraint" + std::to_string(scene.constraints.size());
+  if (name != inOneLine(name)) map.at("constraints[].name").fail("'name' must be in one line");
+  if (!out.constraint_names.insert(name).second)
+    value.fail("a constraint with the name '" + name + "' is there already");
+  bool told = false;
+  const std::size_t before = scene.constraints.size();
+  for (const int r : rods) {
+    const Rod &rod = scene.rods[r];
+    Constraint c{};
+    c.kind = type == "pin" ? Constraint::Kind::pin : Constraint::Kind::rotation;
+    c.name = rods.size() == 1 ? name : name + "#" + std::to_string(scene.constraints.size() - before);
+    c.rod = r;
+    if (!map.has("constraints[].stiffness"))
+      value.fail("'stiffness' is missing; to hold a " + std::string(c.isPin() ? "vertex" : "frame") +
+                 " exactly, write a support of 'type: " + (c.isPin() ? "pin" : "clamp") + "'");
+    c.stiffness = map.number("constraints[].stiffness");
+    c.damping = map.number("constraints[].damping");
+    c.saturation = map.number("constraints[].saturation");
+    c.damps_motion = !map.flag("constraints[].update_old_target");
+    if (c.stiffness == 0 && c.damping == 0)
+      value.fail("'stiffness' and 'damping' are both zero: nothing is constrained");
+    if (c.saturation == 0)
+      map.at("constraints[].saturation").fail("'saturation' must be positive, or negative for none; found 0");
+    if (map.has("constraints[].motion")) {
+      const YamlValue motion = map.at("constraints[].motion");
+      c.motion = readMotion(motion, motion_keys);
+      if (c.isPin())
+        refuseTurning(motion, c.motion, "a pin turns nothing; take the rotation away, or write 'type: rotation', too");
+      else
+        refuseTravel(motion, c.motion, "a rotation moves nothing; take the displacement away, or add a pin that moves");
+    }
+    c.isPin() ? readPin(map, rod, scene.supports, c) : readRotation(map, rod, c);
+    const double length = rod.length();
+    const double own = c.isPin() ? rod.material.axial_stiffness / length : stiffestTurning(rod.material) / length;
+    if (c.stiffness > 1e6 * own && !told) {
+      out.notes.push_back("warning: " + map.at("constraints[].stiffness").place() + ": 'stiffness' is " +
+                          shortText(c.stiffness / own) + " times that of rod '" + rod.name +
+                          "', which costs digits; a support of 'type: " + (c.isPin() ? "pin" : "clamp") + "' is exact");
+      told = true;
+    }
+    scene.constraints.push_back(std::move(c));
+  }
+  map.finish();
+}
+
+} // namespace tendril
