@@ -20,7 +20,9 @@ import numpy as np
 
 FORMATS = (1, 2)
 PLACES = ("vertices", "edges", "cells")
-ON_DEMAND = ("curvature", "twist", "strain_energy_density", "force", "moment", "reaction", "position_low")
+ROWS = ("supports", "constraints")  # of fields that are not of rods
+ON_DEMAND = ("curvature", "twist", "strain_energy_density", "force", "moment", "reaction", "reaction_moment",
+             "constraint_deviation", "constraint_force", "position_low")
 
 # Place and unit of what is in files of format 1; later ones tell by themselves.
 FORMAT_1_FIELDS = {
@@ -99,7 +101,7 @@ def _open(path):
 
 
 class Field:
-    """A field of all rods, at `place`: vertices, edges, cells or supports; indices read from the file what they ask for.
+    """A field of all rods, at `place`: vertices, edges, cells, supports or constraints; indices read from the file what they ask for.
 
     field[frame], field[first:last, vertex], numpy.asarray(field). Shape: (frames, n), or (frames, n, components).
     """
@@ -188,9 +190,9 @@ class Rod:
         return self._t._dataset("reference/" + name)[self._slices["edges" if name == "director" else "vertices"]]
 
     def _slice(self, place):
-        if place == "supports":
-            raise TendrilError("a field of supports is not one of rods: trajectory.field(name)[frame] has a row for each "
-                               "of trajectory.supports")
+        if place in ROWS:
+            raise TendrilError(f"a field of {place} is not one of rods: trajectory.field(name)[frame] has a row for each "
+                               f"of trajectory.{place}")
         if place not in self._slices:
             raise TendrilError(f"files of format 1 do not tell which {place} are those of rod '{self.name}'")
         return self._slices[place]
@@ -232,6 +234,17 @@ class Support:
     type: str
     rod: str
     rod_vertex: int
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A spring and damper: a pin, which draws a vertex, or a rotation, which turns an edge; `place` is its number on the
+    rod."""
+
+    name: str
+    type: str
+    rod: str
+    place: int
 
 
 class Thing:
@@ -339,7 +352,7 @@ class Trajectory:
     """A trajectory.h5, given by its path or that of its folder.
 
     path, format_version, attributes (those of the file: command line, version, ...), gravity (3,) [m/s^2];
-    rods, supports, bodies, colliders; scene: its text, or None; scene_files: texts that it names, by path as written;
+    rods, supports, constraints, bodies, colliders; scene: its text, or None; scene_files: texts that it names, by path as written;
     options: Options. A frame counts once it is complete. What a run has added since is seen after refresh().
     """
 
@@ -397,6 +410,12 @@ class Trajectory:
             for vertex, kind in zip(f["supports/vertex"][:].tolist(), _texts(f["supports/type"])):
                 rod = int(np.searchsorted(starts, vertex, side="right")) - 1
                 self.supports.append(Support(vertex, kind, self._static["name"][rod], vertex - starts[rod]))
+        self.constraints = []
+        if "constraints" in f:
+            columns = [f["constraints/" + name][:].tolist() for name in ("rod", "place")]
+            for name, kind, rod, place in zip(*(_texts(f["constraints/" + n]) for n in ("name", "type")), *columns):
+                start = self._static["vertices" if kind == "pin" else "edges"][rod]
+                self.constraints.append(Constraint(name, kind, self._static["name"][rod], place - start))
         self.scene = _text(f["scene"][()]) if "scene" in f else None
         files = f["scene_files"].values() if "scene_files" in f else ()
         self.scene_files = {_text(data.attrs["path"]): _text(data[()]) for data in files}
@@ -411,7 +430,7 @@ class Trajectory:
         for name, data in self._file["state"].items():
             place, unit = FORMAT_1_FIELDS.get(name, (None, None)) if self.format_version == 1 else (
                 _text(data.attrs.get(key)) for key in ("place", "unit"))
-            if place in (*PLACES, "supports"):
+            if place in (*PLACES, *ROWS):
                 self._fields[name] = place, unit
 
     # Made when asked for: without circular references a file is closed as soon as its Trajectory is let go.
@@ -524,11 +543,12 @@ class Trajectory:
             import xarray
         except ImportError:
             raise TendrilError("to_xarray needs xarray: apt-get install python3-xarray") from None
-        dimension = {"vertices": "vertex", "edges": "edge", "cells": "cell", "supports": "support"}
+        dimension = {"vertices": "vertex", "edges": "edge", "cells": "cell", "supports": "support",
+                     "constraints": "constraint"}
         variables = {}
         for name in self._fields:
             field = self.field(name)
-            components = {1: (), 3: ("xyz",), 2: ("axis",)}[field.shape[2] if field.ndim == 3 else 1]
+            components = {1: (), 3: ("xyz",), 2: ("axis",), 6: ("motion",)}[field.shape[2] if field.ndim == 3 else 1]
             variables[name] = ("time", dimension[field.place], *components), field[:], {"units": field.unit}
         coordinates = {"time": ("time", self.time, {"units": self.unit("time")}), "xyz": ["x", "y", "z"]}
         for place in ("vertices", "edges"):

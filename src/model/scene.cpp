@@ -24,19 +24,21 @@ Vec3 interpolate(const std::vector<Motion::Key> &table, double time, Vec3 Motion
   return s == 0 ? table[i].*member : Vec3((1 - s) * (table[i].*member) + s * (table[i + 1].*member));
 }
 
+/// How fast a member changes between the two rows around `time`, the one before where they meet; zero outside.
+Vec3 slope(const std::vector<Motion::Key> &table, double time, Vec3 Motion::Key::*member) {
+  for (std::size_t k = 1; k < table.size(); ++k)
+    if (table[k - 1].time < time && time <= table[k].time)
+      return (table[k].*member - table[k - 1].*member) / (table[k].time - table[k - 1].time);
+  return Vec3::Zero();
+}
+
 } // namespace
 
 Vec3 Motion::displacementAt(double time) const {
   return table.empty() ? Vec3(velocity * time) : interpolate(table, time, &Key::displacement);
 }
 
-Vec3 Motion::velocityAt(double time) const {
-  if (table.empty()) return velocity;
-  for (std::size_t k = 1; k < table.size(); ++k)
-    if (table[k - 1].time < time && time <= table[k].time)
-      return (table[k].displacement - table[k - 1].displacement) / (table[k].time - table[k - 1].time);
-  return Vec3::Zero();
-}
+Vec3 Motion::velocityAt(double time) const { return table.empty() ? velocity : slope(table, time, &Key::displacement); }
 
 Vec3 Motion::rotationVectorAt(double time) const {
   return table.empty() ? Vec3(angular_velocity * time) : interpolate(table, time, &Key::rotation);
@@ -52,17 +54,12 @@ Mat3 Motion::rotationAt(double time) const {
 /// Jl(r) dr/dt of the rotation vector r, Jl the left Jacobian of the exponential map.
 Vec3 Motion::angularVelocityAt(double time) const {
   if (table.empty()) return angular_velocity;
-  for (std::size_t k = 1; k < table.size(); ++k)
-    if (table[k - 1].time < time && time <= table[k].time) {
-      const Vec3 r = rotationVectorAt(time),
-                 rate = (table[k].rotation - table[k - 1].rotation) / (table[k].time - table[k - 1].time);
-      const double angle = r.norm();
-      if (angle < 1e-8) return rate;
-      const Vec3 axis = r / angle;
-      const double sine = std::sin(angle) / angle, cosine = (1 - std::cos(angle)) / angle;
-      return sine * rate + (1 - sine) * axis * axis.dot(rate) + cosine * axis.cross(rate);
-    }
-  return Vec3::Zero();
+  const Vec3 r = rotationVectorAt(time), rate = slope(table, time, &Key::rotation);
+  const double angle = r.norm();
+  if (angle < 1e-8) return rate;
+  const Vec3 axis = r / angle;
+  const double sine = std::sin(angle) / angle, cosine = (1 - std::cos(angle)) / angle;
+  return sine * rate + (1 - sine) * axis * axis.dot(rate) + cosine * axis.cross(rate);
 }
 
 Vec3 Motion::turnBetween(double from, double to) const {

@@ -72,6 +72,10 @@ def exampleScene(path, value):
         put(scene, "loads[].torque", 1e-4)
     if path.startswith("loads[]"):
         put(scene, "loads[].edge" if name in ("torque", "moment", "edge") else "loads[].vertex", "last")
+    if path.startswith("constraints[]"):
+        turns = name in ("edge", "tangent", "director", "measure", "angular_velocity")
+        scene["constraints"][0]["type"] = "rotation" if turns else "pin"
+        put(scene, "constraints[].edge" if turns else "constraints[].vertex", "last")
     if path.startswith("supports[].motion"):
         scene["supports"][0]["type"] = "clamp"
     if not any(shape in scene.get("rods", [{}])[0] for shape in ("line", "ring", "helix", "points", "file")):

@@ -6,6 +6,7 @@
 #include "support/rods.hpp"
 #include "tendril/energy/constraint.hpp"
 #include "tendril/energy/derived.hpp"
+#include "tendril/model/redraw.hpp"
 
 namespace tendril::test {
 namespace {
@@ -300,6 +301,33 @@ TEST(Constraints, CountWholeTurns) {
     // GJ = 2/3 over 0.95 of the length, beside the spring
     EXPECT_NEAR(a.constraint[0].moment[0], 20 / (0.95 * 1.5 + 1e-4), 1e-6) << steps;
   }
+}
+
+/// A rotation keeps its place where the number of edges grows by odd factors; all else there is of second order.
+TEST(Constraints, AreOfSecondOrderWithTheEdges) {
+  Rod rod = straightRod(5, Measure::angle);
+  rod.energy = Energy::classical;
+  rod.material.axial_stiffness = 400;
+  Scene written = clampedScene(rod);
+  written.supports.clear();
+  written.gravity = Vec3(0, -1.5, 0);
+  Frame f = referenceFrame(rod, 1);
+  const Mat3 turn = Eigen::AngleAxisd(0.4, Vec3(0.3, 0.2, 0.9).normalized()).toRotationMatrix();
+  Constraint turned = turnTo(0, 1, {turn * f.tangent, turn * f.director, 1}, 3);
+  turned.place_given = true;
+  written.constraints = {pinTo(written, 0, 0, Vec3::Zero(), 30), pinTo(written, 0, 5, Vec3::Zero(), 20), turned};
+  std::vector<Vec3> ends;
+  for (const int edges : {15, 45, 135, 405}) {
+    Simulation sim;
+    runTo(sim, redraw(written, {Drawing{}}, {edges}), statics());
+    ends.push_back(sim.state.position.back());
+  }
+  for (int k = 0; k < 2; ++k) {
+    const double ratio = (ends[k] - ends[k + 1]).norm() / (ends[k + 1] - ends[k + 2]).norm();
+    EXPECT_NEAR(ratio, 9, 0.4) << k;
+  }
+  EXPECT_GT((ends[0] - ends[1]).norm(), 1e-6);
+  EXPECT_THROW(redraw(written, {Drawing{}}, {10}), SceneError);
 }
 
 } // namespace
