@@ -237,158 +237,138 @@ PetscErrorCode ArcLength::switchBranch(const CriticalPoint &critical, double len
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, bool *finished) {
-  constexpr double wanted_iterations = 4, most_growth = 4;
+EnergyBudget ArcLength::energyOf(const State &at) const {
+  const IncrementalPotential &potential = solver_.potential();
+  EnergyBudget budget;
+  for (int r = 0; r < potential.all().end; ++r) budget += potential.energyBudget(at, potential.iterate(), at.time, r);
+  return budget;
+}
+
+/// Solves the next step, and judges whether its end is the path's; `obstacle_` says what is wrong with it.
+PetscErrorCode ArcLength::tryStep(const State &state, const Walk &walk, Tried *now) {
   constexpr double least_alignment = 0.5; // of the tangents at the ends of a step, 60 degrees
   PetscFunctionBeginUser;
   IncrementalPotential &potential = solver_.potential();
-  PetscLogDouble begin, now;
+  PetscCall(step(state, walk.length, &now->converged));
+  if (now->converged) {
+    const int negative = negative_;
+    PetscCall(tangent(&now->end));
+    // At a limit point an odd number of pivots and the slope change sign together. Pivots alone: a bifurcation, or a
+    // turn so sharp that the tangent behind it was taken for the reverse of the tangent before. Short steps tell.
+    now->crossed = negative != negative_;
+    const bool odd = (negative - negative_) % 2 != 0, turns = now->turns(walk);
+    const bool doubtful = odd != turns && potential.scene().moments.empty() && walk.length > walk.first / 16;
+    astray_ = doubtful || product(walk.direction, now->end) < least_alignment;
+    if (astray_) {
+      now->converged = false;
+      obstacle_ = "the path turns too sharply; take more -load_steps, so that steps begin shorter";
+    }
+  }
+  bool little = true;
+  if (now->converged) PetscCall(verify(now->end, &little));
+  if (!little && sharpness_ > 1e-6) { // a tolerance relative to all loads may be too dull for what they move
+    sharpness_ *= 1e-2;
+    now->converged = false;
+    obstacle_ = "what Newton would still move it by is not little; lower -snes_rtol or use fewer edges";
+    PetscFunctionReturn(0);
+  }
+  if (!little) {
+    std::ostringstream message;
+    message << "step along the path at load factor " << state.time
+            << " is lost in rounding: Newton would still move it by " << left_ << " of the length, it moves "
+            << size(last_) << " (-rounding_tolerance " << potential.settings.rounding_tolerance << "); use fewer edges"
+            << imbalance();
+    failure_ = message.str();
+    PetscFunctionReturn(0);
+  }
+  // Full load lies before a limit point above it: shorter steps end on the near side.
+  if (now->converged && now->turns(walk) && potential.step().time >= settings_.t_end) {
+    now->converged = false;
+    obstacle_ = "a limit point lies just above full load; raise the loads, so that the path passes it";
+  }
+  PetscFunctionReturn(0);
+}
+
+/// Halves the next step, or goes back with a sharper tolerance. The state was not touched.
+PetscErrorCode ArcLength::shorten(State &state, const Tried &failed, Walk *walk) {
+  PetscFunctionBeginUser;
+  last_ = failed.before;
+  bool refined = false;
+  if (astray_ && sharpness_ == 1) PetscCall(refine(state, &walk->direction, &refined));
+  ++walk->rejected;
+  walk->in_vain += iterations_;
+  if (!refined) walk->length *= 0.5;
+  if (walk->length >= walk->shortest) PetscFunctionReturn(0);
+  const std::string out_of_balance = astray_ ? "" : imbalance();
+  if (walk->taken == 0) PetscCall(refuseFreeStart(state));
+  if (!failure_.empty()) PetscFunctionReturn(0);
+  std::ostringstream message;
+  message << "step along the path at load factor " << state.time << " failed with length " << 2 * walk->length
+          << " after " << iterations_ << (iterations_ == 1 ? " iteration: " : " iterations: ") << obstacle_
+          << out_of_balance;
+  failure_ = message.str();
+  PetscFunctionReturn(0);
+}
+
+Diagnostics ArcLength::rowOf(const State &state, const EnergyBudget &energy, const Work &work, Walk *walk) const {
+  Diagnostics row;
+  row.time = state.time;
+  row.dt = std::sqrt(product(last_, last_));
+  row.energy = energy;
+  row.work = work;
+  row.dissipated = walk->energy + work.total() - energy.total();
+  walk->energy = energy.total();
+  row.newton_iterations = iterations_;
+  row.negative_pivots = negative_;
+  row.rounding_error = left_;
+  row.rejected_steps = std::exchange(walk->rejected, 0);
+  row.rejected_iterations = std::exchange(walk->in_vain, 0);
+  return row;
+}
+
+PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, bool *finished) {
+  constexpr double wanted_iterations = 4, most_growth = 4;
+  PetscFunctionBeginUser;
+  IncrementalPotential &potential = solver_.potential();
+  PetscLogDouble begin, end;
   PetscCall(PetscTime(&begin));
   *finished = false;
   PetscCall(findStart(state));
   if (!failure_.empty()) PetscFunctionReturn(0);
-  Step load;
-  load.load_factor = 1;
-  for (int r = 0; r < potential.all().end; ++r) load_->beginStep(state, potential.iterate(), load, r);
-
-  Point direction;
-  PetscCall(tangent(&direction));
-  rounding_ = 0;
-  for (int r = 0; r < potential.all().end; ++r)
-    rounding_ =
-        std::max(rounding_, 4 * std::numeric_limits<double>::epsilon() *
-                                std::max(1.0, potential.rodEnergy(potential.iterate(), r).reach / potential.length(r)));
-  load_reach_ = size(direction) / std::abs(direction.factor);
-  const double first = settings_.dt / direction.factor; // as long as a load step of dt
-  const double shortest = first * (settings_.dt_min > 0 ? settings_.dt_min / settings_.dt : 1.0 / 1024);
-  double length = first;
-  int rejected = 0, in_vain = 0; // steps since the last one accepted, and their iterations
-  auto energyOf = [&](const State &at) {
-    EnergyBudget budget;
-    for (int r = 0; r < potential.all().end; ++r) budget += potential.energyBudget(at, potential.iterate(), at.time, r);
-    return budget;
-  };
-  EnergyBudget before = energyOf(state);
-  for (int taken = 0; taken < settings_.arclength_steps && state.time < settings_.t_end;) {
-    const State start = state;
-    const Point before_step = last_;
+  Walk walk;
+  PetscCall(beginWalk(state, &walk));
+  while (walk.taken < settings_.arclength_steps && state.time < settings_.t_end) {
+    Tried now{state, last_, {}};
     const Doing here([&](std::ostream &out) {
-      out << "step along the path at load factor " << start.time << ", length " << length;
-      if (rejected > 0) out << ", after " << rejected << " that failed";
+      out << "step along the path at load factor " << now.start.time << ", length " << walk.length;
+      if (walk.rejected > 0) out << ", after " << walk.rejected << " that failed";
     });
-    bool converged;
-    PetscCall(step(state, length, &converged));
-    const double slope = direction.factor;
-    Point end;
-    bool crossed = false; // the count of negative pivots has changed
-    if (converged) {
-      const int negative = negative_;
-      PetscCall(tangent(&end));
-      // At a limit point an odd number of pivots and the slope change sign together. Pivots alone: a bifurcation, or a
-      // turn so sharp that the tangent behind it was taken for the reverse of the tangent before. Short steps tell.
-      crossed = negative != negative_;
-      const bool odd = (negative - negative_) % 2 != 0, turns = slope * end.factor < 0;
-      const bool doubtful = odd != turns && potential.scene().moments.empty() && length > first / 16;
-      astray_ = doubtful || product(direction, end) < least_alignment;
-      if (astray_) {
-        converged = false;
-        obstacle_ = "the path turns too sharply; take more -load_steps, so that steps begin shorter";
-      }
-    }
-    bool little = true;
-    if (converged) PetscCall(verify(end, &little));
-    if (!little && sharpness_ > 1e-6) { // a tolerance relative to all loads may be too dull for what they move
-      sharpness_ *= 1e-2;
-      converged = false;
-      obstacle_ = "what Newton would still move it by is not little; lower -snes_rtol or use fewer edges";
-      little = true;
-    }
-    if (!little) {
-      std::ostringstream message;
-      message << "step along the path at load factor " << state.time
-              << " is lost in rounding: Newton would still move it by " << left_ << " of the length, it moves "
-              << size(last_) << " (-rounding_tolerance " << potential.settings.rounding_tolerance
-              << "); use fewer edges" << imbalance();
-      failure_ = message.str();
-      PetscFunctionReturn(0);
-    }
-    // Full load lies before a limit point above it: shorter steps end on the near side.
-    if (converged && slope * end.factor < 0 && potential.step().time >= settings_.t_end) {
-      converged = false;
-      obstacle_ = "a limit point lies just above full load; raise the loads, so that the path passes it";
-    }
-    if (!converged) { // the state was not touched
-      last_ = before_step;
-      bool refined = false;
-      if (astray_ && sharpness_ == 1) PetscCall(refine(state, &direction, &refined));
-      ++rejected;
-      in_vain += iterations_;
-      if (!refined) length *= 0.5;
-      if (length >= shortest) continue;
-      const std::string out_of_balance = astray_ ? "" : imbalance();
-      if (taken == 0) PetscCall(refuseFreeStart(state));
-      if (!failure_.empty()) PetscFunctionReturn(0);
-      std::ostringstream message;
-      message << "step along the path at load factor " << state.time << " failed with length " << 2 * length
-              << " after " << iterations_ << (iterations_ == 1 ? " iteration: " : " iterations: ") << obstacle_
-              << out_of_balance;
-      failure_ = message.str();
-      PetscFunctionReturn(0);
-    }
-    std::swap(direction, end);
+    PetscCall(tryStep(state, walk, &now));
+    if (failure_.empty() && !now.converged) PetscCall(shorten(state, now, &walk));
+    if (!failure_.empty()) PetscFunctionReturn(0);
+    if (!now.converged) continue;
     potential.commit(state);
     EnergyBudget energy = energyOf(state);
     Work work =
-        staticWork(potential.scene(), potential.elements(), start, state, potential.start(), potential.iterate());
-    ++taken;
-    std::vector<CriticalPoint> critical;
-    const bool locates = settings_.bifurcation != Bifurcation::off;
-    if (locates && slope * direction.factor < 0)
-      PetscCall(locateLimit(start, before_step, {slope, direction.factor}, length, &critical));
-    else if (locates && crossed && potential.scene().moments.empty())
-      PetscCall(locateBifurcation(start, state, before_step, length, &critical));
-    if (settings_.bifurcation != Bifurcation::locate && critical.size() > 1)
-      critical.resize(1); // the run goes no further this way
-    for (const CriticalPoint &point : critical)
-      if (on_critical) PetscCall(on_critical(point));
-    if (!critical.empty() && settings_.bifurcation == Bifurcation::stop) {
-      state = *critical.front().state;
-      *finished = true;
-      PetscFunctionReturn(0);
-    }
-    if (!critical.empty() && !critical.front().limit && settings_.bifurcation == Bifurcation::switch_branch) {
-      bool switched;
-      PetscCall(switchBranch(critical.front(), length, shortest, &state, &switched));
-      if (!switched) {
-        std::ostringstream message;
-        message << "no branch was found along the critical mode at load factor " << critical.front().load_factor << ": "
-                << obstacle_;
-        failure_ = message.str();
-        state = *critical.front().state;
-        PetscFunctionReturn(0);
-      }
-      PetscCall(tangent(&direction));
+        staticWork(potential.scene(), potential.elements(), now.start, state, potential.start(), potential.iterate());
+    ++walk.taken;
+    bool switched;
+    PetscCall(passCritical(now, walk, state, finished, &switched));
+    if (*finished || !failure_.empty()) PetscFunctionReturn(0);
+    std::swap(walk.direction, now.end);
+    if (switched) {
+      PetscCall(tangent(&walk.direction));
       energy = energyOf(state);
-      work = staticWork(potential.scene(), potential.elements(), start, state);
+      work = staticWork(potential.scene(), potential.elements(), now.start, state);
     }
-    Diagnostics row;
-    row.time = state.time;
-    row.dt = std::sqrt(product(last_, last_));
-    row.energy = energy;
-    row.work = work;
-    row.dissipated = before.total() + work.total() - energy.total();
-    before = energy;
-    row.newton_iterations = iterations_;
-    row.negative_pivots = negative_;
-    row.rounding_error = left_;
-    row.rejected_steps = std::exchange(rejected, 0);
-    row.rejected_iterations = std::exchange(in_vain, 0);
-    PetscCall(PetscTime(&now));
-    row.wall_seconds = now - begin;
+    Diagnostics row = rowOf(state, energy, work, &walk);
+    PetscCall(PetscTime(&end));
+    row.wall_seconds = end - begin;
     PetscCall(observe(state, row));
     if (stops && state.time < settings_.t_end && stops()) PetscFunctionReturn(0);
-    length = std::clamp(length * std::clamp(std::sqrt(wanted_iterations / std::max(iterations_, 1)), 0.5, 2.0),
-                        shortest, most_growth * first);
+    walk.length =
+        std::clamp(walk.length * std::clamp(std::sqrt(wanted_iterations / std::max(iterations_, 1)), 0.5, 2.0),
+                   walk.shortest, most_growth * walk.first);
   }
   *finished = true;
   PetscFunctionReturn(0);

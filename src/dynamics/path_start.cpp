@@ -202,4 +202,54 @@ std::string ArcLength::imbalance() {
   return tellImbalance(potential, farthestRod(potential, potential.all(), asked), asked);
 }
 
+/// Takes the equilibrium where the potential is for the start of the path.
+PetscErrorCode ArcLength::beginWalk(const State &state, Walk *walk) {
+  PetscFunctionBeginUser;
+  IncrementalPotential &potential = solver_.potential();
+  Step load;
+  load.load_factor = 1;
+  for (int r = 0; r < potential.all().end; ++r) load_->beginStep(state, potential.iterate(), load, r);
+  PetscCall(tangent(&walk->direction));
+  rounding_ = 0;
+  for (int r = 0; r < potential.all().end; ++r)
+    rounding_ =
+        std::max(rounding_, 4 * std::numeric_limits<double>::epsilon() *
+                                std::max(1.0, potential.rodEnergy(potential.iterate(), r).reach / potential.length(r)));
+  load_reach_ = size(walk->direction) / std::abs(walk->direction.factor);
+  walk->first = settings_.dt / walk->direction.factor; // as long as a load step of dt
+  walk->shortest = walk->first * (settings_.dt_min > 0 ? settings_.dt_min / settings_.dt : 1.0 / 1024);
+  walk->length = walk->first;
+  walk->energy = energyOf(state).total();
+  PetscFunctionReturn(0);
+}
+
+/// Looks for critical points within the step just taken, tells them, and does with them what is asked for: `ends` where
+/// the run stops at one, `switched` where it goes on along the branch that leaves there.
+PetscErrorCode ArcLength::passCritical(const Tried &now, const Walk &walk, State &state, bool *ends, bool *switched) {
+  PetscFunctionBeginUser;
+  *ends = *switched = false;
+  if (settings_.bifurcation == Bifurcation::off) PetscFunctionReturn(0);
+  std::vector<CriticalPoint> critical;
+  if (now.turns(walk))
+    PetscCall(locateLimit(now.start, now.before, {walk.direction.factor, now.end.factor}, walk.length, &critical));
+  else if (now.crossed && solver_.potential().scene().moments.empty())
+    PetscCall(locateBifurcation(now.start, state, now.before, walk.length, &critical));
+  if (settings_.bifurcation != Bifurcation::locate && critical.size() > 1)
+    critical.resize(1); // the run goes no further this way
+  for (const CriticalPoint &point : critical)
+    if (on_critical) PetscCall(on_critical(point));
+  if (critical.empty()) PetscFunctionReturn(0);
+  const CriticalPoint &first = critical.front();
+  *ends = settings_.bifurcation == Bifurcation::stop;
+  if (*ends) state = *first.state;
+  if (first.limit || settings_.bifurcation != Bifurcation::switch_branch) PetscFunctionReturn(0);
+  PetscCall(switchBranch(first, walk.length, walk.shortest, &state, switched));
+  if (*switched) PetscFunctionReturn(0);
+  std::ostringstream message;
+  message << "no branch was found along the critical mode at load factor " << first.load_factor << ": " << obstacle_;
+  failure_ = message.str();
+  state = *first.state;
+  PetscFunctionReturn(0);
+}
+
 } // namespace tendril

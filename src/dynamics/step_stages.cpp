@@ -5,53 +5,88 @@
 
 namespace tendril {
 
-/// Solves the stages of a step one after the other; the potential's iterate is the end of the step then. The state is
-/// not touched.
-PetscErrorCode TimeLoop::solveStages(const State &start, const Step &step, NewtonReport *report) {
+/// Solves the stages of a step one after the other; the potential's iterate is the end of the step then.
+PetscErrorCode TimeLoop::solveStages(const State &start, State *next, Attempt *now) {
   PetscFunctionBeginUser;
   IncrementalPotential &potential = solver_.potential();
   const bool dissipates = potential.scene().strainsDissipate();
+  const double h = now->h;
   stages_.clear();
   actions_.clear();
-  solver_.on_block = [&](RodSet rods) { noteActions(start, rods); };
   for (bool more = true; more;) {
-    StageRule rule = integrator_->stage(start, step.dt, stages_);
-    Step stage = step;
+    StageRule rule = integrator_->stage(start, h, stages_);
+    Step stage = now->step;
     stage.dt = rule.dt;
-    stage.rule = integrator_->leavesChords() ? nullptr : &rule;
-    if (rule.fraction != 1) stage.time = start.time + rule.fraction * step.dt;
+    stage.rule = &rule;
+    if (rule.fraction != 1) stage.time = start.time + rule.fraction * h;
     std::vector<double> behind;
     if (dissipates && rule.tangent_rates) behind = strainsBehind(solver_, start, stage);
     if (!behind.empty()) rule.damping_past = {{-1, behind.data()}};
-    NewtonReport one;
     actions_.emplace_back(2 * moving_.size());
+    StageRates &rates = stages_.emplace_back();
+    const bool is_end = integrator_->endsAtStage() && int(stages_.size()) >= integrator_->stages(start);
+    solver_.on_block = [&](RodSet rods) {
+      potential.stageRates(rods, rates);
+      noteActions(start, rods);
+      if (!is_end) return;
+      finish(start, h, rods, next);
+      now->commit(potential, rods, next);
+    };
+    NewtonReport one;
     PetscCall(solver_.solve(start, stage, &one));
+    solver_.on_block = nullptr;
     const int iterations = one.iterations;
-    one.iterations += report->iterations; // stages follow each other; blocks of rods do not
-    report->include(one);
-    report->converged = one.converged;
-    report->reason = one.reason;
-    report->negative_pivots = one.negative_pivots;
+    NewtonReport &report = now->report;
+    one.iterations += report.iterations; // stages follow each other; blocks of rods do not
+    report.include(one);
+    report.converged = one.converged;
+    report.reason = one.reason;
+    report.negative_pivots = one.negative_pivots;
     if (!one.converged) PetscFunctionReturn(0);
-    stages_.push_back(potential.stageRates(rule));
     more = integrator_->goesOn(start, stages_, iterations);
     if (dissipates && (more || !integrator_->endsAtStage()))
-      stages_.back().strains = strainsOf(potential.scene(), potential.elements(), potential.iterate());
+      rates.strains = strainsOf(potential.scene(), potential.elements(), potential.iterate());
   }
-  if (!integrator_->endsAtStage() && !potential.moveOn(step.time, integrator_->end(start, step.dt, stages_))) {
-    report->converged = false;
-    report->reason = "the end of the step, beyond its last stage, is not a possible configuration";
+  if (integrator_->endsAtStage()) PetscFunctionReturn(0);
+  if (!potential.moveOn(now->step.time, integrator_->end(start, h, stages_))) {
+    now->report.converged = false;
+    now->report.reason = "the end of the step, beyond its last stage, is not a possible configuration";
+    PetscFunctionReturn(0);
   }
+  finish(start, h, potential.all(), next);
+  now->commit(potential, potential.all(), next);
   PetscFunctionReturn(0);
+}
+
+/// Velocities and memory of some rods at the end of the step; vertices that supports move have the velocities of these.
+void TimeLoop::finish(const State &start, double h, RodSet rods, State *next) {
+  const IncrementalPotential &potential = solver_.potential();
+  const Piece piece(potential.elements(), rods);
+  integrator_->velocity(start, h, stages_).assignTo(piece, next->velocity, next->twist_rate);
+  const std::vector<Combination> memory = integrator_->remembers(start, h, stages_);
+  next->memory.resize(memory.size());
+  for (std::size_t n = 0; n < memory.size(); ++n) {
+    next->memory[n].vertex.resize(start.velocity.size());
+    next->memory[n].edge.resize(start.twist_rate.size());
+    memory[n].assignTo(piece, next->memory[n].vertex, next->memory[n].edge);
+  }
+  for (int r = rods.begin; r < rods.end && !moving_.empty(); ++r)
+    for (const int k : moving_of_[r]) {
+      const Support *support = moving_[k].support;
+      if (!support || !support->holdsPosition()) continue;
+      const int v = potential.elements().rods[r].first_vertex + support->vertex;
+      next->velocity[v] = support->motion.velocityAt(potential.step().time);
+      for (Rates &rates : next->memory) rates.vertex[v].setZero();
+    }
 }
 
 /// What moving supports and constraints of some rods do at the stage just solved.
 void TimeLoop::noteActions(const State &start, RodSet rods) {
-  for (std::size_t k = 0; k < moving_.size(); ++k) {
-    if (moving_[k].rod < rods.begin || moving_[k].rod >= rods.end) continue;
-    const std::array<Vec3, 2> action = solver_.potential().actionOf(moving_[k], start);
-    std::copy(action.begin(), action.end(), actions_.back().begin() + 2 * k);
-  }
+  for (int r = rods.begin; r < rods.end && !moving_.empty(); ++r)
+    for (const int k : moving_of_[r]) {
+      const std::array<Vec3, 2> action = solver_.potential().actionOf(moving_[k], start);
+      std::copy(action.begin(), action.end(), actions_.back().begin() + 2 * k);
+    }
 }
 
 /// Of the step just solved, without what the inertia of held vertices takes. Weights of what is not remembered are
@@ -89,35 +124,30 @@ double TimeLoop::movedKinetic(const State &state) const {
   return sum;
 }
 
-/// Velocities and memory of the state; held vertices have those of their supports.
-void TimeLoop::finishStages(State &state, double h) {
+/// What the state at the end of the step remembers of strains, actions and the length of the step.
+void TimeLoop::remember(const State &start, double h, State *next) const {
   const IncrementalPotential &potential = solver_.potential();
-  const Scene &scene = potential.scene();
-  const bool keeps = integrator_->remembersStrains() > 0 && scene.strainsDissipate();
+  const bool keeps = integrator_->remembersStrains() > 0 && potential.scene().strainsDissipate();
   if (keeps) {
     std::vector<double> before = strainsOf(potential.scene(), potential.elements(), potential.start());
+    if (!integrator_->endsAtStage()) // as far beyond the middle
+      std::transform(before.begin(), before.end(), stages_.back().strains.begin(), before.begin(),
+                     [](double first, double middle) { return 2 * middle - first; });
     if (integrator_->remembersStrains() > 1)
-      before.insert(before.end(), state.strains.begin(),
-                    state.strains.begin() + std::min(before.size(), state.strains.size()));
-    state.strains = std::move(before);
-  }
-  if (keeps && !integrator_->endsAtStage()) // as far beyond the middle
-    std::transform(state.strains.begin(), state.strains.end(), stages_.back().strains.begin(), state.strains.begin(),
-                   [](double start, double middle) { return 2 * middle - start; });
+      before.insert(before.end(), start.strains.begin(),
+                    start.strains.begin() + std::min(before.size(), start.strains.size()));
+    next->strains = std::move(before);
+  } else
+    next->strains = start.strains;
+  next->support_actions.clear();
   if (integrator_->remembersActions() > 0 && !moving_.empty()) {
-    std::vector<Vec3> &kept = state.support_actions;
-    kept.insert(kept.begin(), actions_.back().begin(), actions_.back().end());
+    std::vector<Vec3> &kept = next->support_actions;
+    kept = actions_.back();
+    kept.insert(kept.end(), start.support_actions.begin(), start.support_actions.end());
     kept.resize(std::min(kept.size(), integrator_->remembersActions() * actions_.back().size()));
   }
-  integrator_->finish(state, h, stages_);
-  if (!state.memory.empty()) state.dt_before = std::exchange(state.last_dt, h);
-  if (integrator_->leavesChords()) return; // of held vertices, too
-  for (const Support &support : scene.supports) {
-    if (!support.holdsPosition()) continue;
-    const int v = potential.elements().rods[support.rod].first_vertex + support.vertex;
-    state.velocity[v] = support.motion.velocityAt(potential.step().time);
-    for (Rates &rates : state.memory) rates.vertex[v].setZero();
-  }
+  next->last_dt = next->memory.empty() ? start.last_dt : h;
+  next->dt_before = next->memory.empty() ? start.dt_before : start.last_dt;
 }
 
 TimeLoop::StepError TimeLoop::stepError(const State &start, double h) const {

@@ -60,24 +60,17 @@ double TimeLoop::longest() const {
 }
 double TimeLoop::shortest() const { return settings_.dt_min > 0 ? settings_.dt_min : longest() / 1024; }
 
-/// Solves the step. What it leads to is in `next` where blocks are committed one by one, while they are in the cache;
-/// else in the stages, from which accept() takes it. The state is not touched.
+/// Solves the step. What it leads to is in `next`, block by block where the last stage is the end of the step; the
+/// state is not touched.
 PetscErrorCode TimeLoop::attempt(const State &state, State *next, Attempt *now) {
   PetscFunctionBeginUser;
-  IncrementalPotential &potential = solver_.potential();
-  if (!isPlain()) {
-    PetscCall(solveStages(state, now->step, &now->report));
-    solver_.on_block = nullptr;
+  if (settings_.dynamic) {
+    PetscCall(solveStages(state, next, now));
     if (now->report.converged && (adapts() || settings_.estimate_error)) now->error = stepError(state, now->h);
     now->too_coarse = now->report.converged && adapts() && !adapt(now->h, shortest(), now->error);
     PetscFunctionReturn(0);
   }
-  solver_.on_block = [&](RodSet rods) {
-    potential.commit(*next, rods);
-    if (settings_.dynamic) noteActions(state, rods);
-    for (int r = rods.begin; r < rods.end; ++r) now->addEnergy(potential, *next, r);
-  };
-  actions_.assign(1, HolderActions(2 * moving_.size()));
+  solver_.on_block = [&](RodSet rods) { now->commit(solver_.potential(), rods, next); };
   std::optional<Guess> guess;
   if (mode_) guess = alongMode(state, now->step);
   PetscCall(solver_.solve(state, now->step, &now->report, Seek::minimum, guess ? &*guess : nullptr));
@@ -85,8 +78,10 @@ PetscErrorCode TimeLoop::attempt(const State &state, State *next, Attempt *now) 
   PetscFunctionReturn(0);
 }
 
-void TimeLoop::Attempt::addEnergy(const IncrementalPotential &potential, const State &end, int rod) {
-  energy += potential.energyBudget(end, potential.iterate(), step.load_factor, rod);
+void TimeLoop::Attempt::commit(const IncrementalPotential &potential, RodSet rods, State *next) {
+  potential.commitConfiguration(*next, rods);
+  for (int r = rods.begin; r < rods.end; ++r)
+    energy += potential.energyBudget(*next, potential.iterate(), step.load_factor, r);
 }
 
 /// Whether a critical point may lie within the step. Couples have no potential: the inertia of the symmetric part says
@@ -106,18 +101,14 @@ void TimeLoop::accept(State &state, State &next, Attempt *now, Work *work) {
     *work = dynamicWork(state, now->h);
     work->supports -= movedKinetic(state);
   }
-  if (isPlain()) {
-    next.time = now->step.time;
-    next.step = state.step + 1;
-    if (!settings_.dynamic)
-      *work += staticWork(potential.scene(), potential.elements(), state, next, potential.start(), potential.iterate());
-    std::swap(state, next);
-  } else {
-    finishStages(state, now->h);
-    potential.commitConfiguration(state);
-    for (int r = 0; r < potential.all().end; ++r) now->addEnergy(potential, state, r);
+  next.time = now->step.time;
+  next.step = state.step + 1;
+  if (settings_.dynamic) {
+    remember(state, now->h, &next);
     control.error_sum += now->error.error;
-  }
+  } else
+    *work += staticWork(potential.scene(), potential.elements(), state, next, potential.start(), potential.iterate());
+  std::swap(state, next);
   if (settings_.dynamic) work->supports += movedKinetic(state);
   control.stable = now->report.negative_pivots == 0;
   control.rounding_sum =
@@ -182,6 +173,8 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     control.energy = energy.total();
   }
   moving_ = movingHolders(scene);
+  moving_of_.assign(moving_.empty() ? 0 : scene.rods.size(), {});
+  for (std::size_t k = 0; k < moving_.size(); ++k) moving_of_[moving_[k].rod].push_back(int(k));
   Work work;                     // since the last row
   int rejected = 0, in_vain = 0; // steps since then, and their iterations
   State next = state; // what the blocks that have converged come to; the state itself stays as it is until all have

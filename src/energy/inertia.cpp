@@ -12,32 +12,18 @@ public:
       : scene_(scene), elements_(elements), predicted_(slot_size, elements.slots), weight_(scene.rods.size()) {}
 
   /// With v = d/dt + u and acceleration (mass v + b)/dt (StageRule), inertia and dissipation are m (mass/dt^2 +
-  /// alpha/dt) (d - d_hat), d_hat = -dt u - b dt/(mass + alpha dt); the same for the twist increment. Backward Euler
-  /// has mass 1, u = 0 and b = -v_n.
-  void beginStep(const State &state, const Configuration &start, const Step &step, int r) override {
+  /// alpha/dt) (d - d_hat), d_hat = -dt u - b dt/(mass + alpha dt); the same for the twist increment.
+  void beginStep(const State &, const Configuration &start, const Step &step, int r) override {
     start_ = &start;
     reference_ = step.twist_reference ? step.twist_reference : &start;
     const RodRange &rod = elements_.rods[r];
     const double alpha = scene_.rods[r].material.mass_damping_coefficient;
-    const double mass = step.rule ? step.rule->mass : 1;
-    weight_[r] = mass / (step.dt * step.dt) + alpha / step.dt;
-    const double reach = step.dt / (mass + alpha * step.dt);
-    if (step.rule) {
-      for (int i = 0; i < rod.vertices; ++i) {
-        const int v = rod.first_vertex + i;
-        predicted_.setVector(0, rod.slot(i),
-                             -step.dt * step.rule->velocity.atVertex(v) - reach * step.rule->acceleration.atVertex(v));
-      }
-      for (int i = 0; i < rod.edges; ++i) {
-        const int e = rod.first_edge + i;
-        predicted_[3][rod.slot(i)] =
-            -step.dt * step.rule->velocity.atEdge(e) - reach * step.rule->acceleration.atEdge(e);
-      }
-      return;
-    }
-    for (int i = 0; i < rod.vertices; ++i)
-      for (int a = 0; a < 3; ++a) predicted_[a][rod.slot(i)] = reach * state.velocity[rod.first_vertex + i][a];
-    for (int i = 0; i < rod.edges; ++i) predicted_[3][rod.slot(i)] = reach * state.twist_rate[rod.first_edge + i];
+    const StageRule &rule = *step.rule;
+    weight_[r] = rule.mass / (step.dt * step.dt) + alpha / step.dt;
+    for (int a = 0; a < slot_size; ++a)
+      std::fill_n(predicted_[a] + rod.first_slot, a < 3 ? rod.vertices : rod.edges, 0.0);
+    predict(rule.velocity, -step.dt, rod);
+    predict(rule.acceleration, -step.dt / (rule.mass + alpha * step.dt), rod);
   }
 
   [[gnu::flatten]] double energy(const Configuration &c, int r) const override {
@@ -102,6 +88,16 @@ private:
                       *reference_ = nullptr; ///< what displacements, and what twists are measured from
   Planes predicted_;                         ///< displacements and twists
   std::vector<double> weight_;
+
+  void predict(const Combination &sum, double factor, const RodRange &rod) {
+    for (const Combination::Part &part : sum.parts()) {
+      const double weight = factor * part.weight;
+      for (int a = 0; a < 3; ++a)
+        for (int i = 0; i < rod.vertices; ++i)
+          predicted_[a][rod.slot(i)] += weight * (*part.vertex)[rod.first_vertex + i][a];
+      for (int i = 0; i < rod.edges; ++i) predicted_[3][rod.slot(i)] += weight * (*part.edge)[rod.first_edge + i];
+    }
+  }
 };
 
 } // namespace

@@ -20,8 +20,13 @@ void IncrementalPotential::beginStep(const State &start, const Step &step) {
   step_ = step;
   setSupports(scene_, elements_, start.time, start_);
   if (iterate_.empty()) iterate_ = start_;
-  if (step.rule && reference_.empty()) reference_ = start_;
-  step_.twist_reference = step.rule ? &reference_ : nullptr;
+  if (!step.isStatic() && !step.rule) {
+    euler_ = backwardEuler(start, step.dt);
+    step_.rule = &euler_;
+  }
+  const bool carries = step_.rule && step_.rule->carries_frames;
+  if (carries && reference_.empty()) reference_ = start_;
+  step_.twist_reference = carries ? &reference_ : nullptr;
   supports_.turn(start_, start_time_, step_.time);
   retraction_.setInverseTimeSquared(step.isStatic() ? 0 : 1 / (step.dt * step.dt));
 }
@@ -29,7 +34,7 @@ void IncrementalPotential::beginStep(const State &start, const Step &step) {
 void IncrementalPotential::beginRod(const State &start, int r) {
   setRod(start, elements_, r, start_);
   iterate_.copyRod(elements_, r, start_);
-  if (step_.rule) carryFrames(*step_.rule, elements_, r, start_, reference_);
+  if (step_.twist_reference) carryFrames(*step_.rule, elements_, r, start_, reference_);
   axial_.beginStep(start_, step_, r);
   for (auto &term : terms_) term->beginStep(start, start_, step_, r);
   supports_.follow(r, iterate_);
@@ -263,6 +268,18 @@ Residual IncrementalPotential::residual() {
   return worst;
 }
 
+void IncrementalPotential::commit(State &state) const {
+  if (step_.rule) {
+    StageRates rates;
+    stageRates(all(), rates);
+    state.velocity = std::move(rates.velocity.vertex);
+    state.twist_rate = std::move(rates.velocity.edge);
+  }
+  commitConfiguration(state, all());
+  state.time = step_.time;
+  ++state.step;
+}
+
 std::array<Vec3, 2> IncrementalPotential::actionOf(const Holder &holder, const State &start) {
   std::array<Vec3, 2> action{Vec3::Zero(), Vec3::Zero()};
   const int slot = holder.support ? elements_.support_slot[holder.index] : elements_.constraint_slot[holder.index];
@@ -276,11 +293,8 @@ std::array<Vec3, 2> IncrementalPotential::actionOf(const Holder &holder, const S
     const int slot = elements_.rods[support.rod].slot(support.vertex),
               v = elements_.rods[support.rod].first_vertex + support.vertex;
     const Vec3 moved = iterate_.displacementAt(slot, start_);
-    Vec3 velocity = moved / step_.dt, acceleration = (velocity - start.velocity[v]) / step_.dt;
-    if (const StageRule *rule = step_.rule) {
-      velocity += rule->velocity.atVertex(v);
-      acceleration = (rule->mass * velocity + rule->acceleration.atVertex(v)) / step_.dt;
-    }
+    const Vec3 velocity = moved / step_.dt + step_.rule->velocity.atVertex(v),
+               acceleration = (step_.rule->mass * velocity + step_.rule->acceleration.atVertex(v)) / step_.dt;
     // What methods remember of held vertices is nothing, which does not matter to them: the velocity that dissipates is
     // that of the way.
     const Vec3 astray = moved / (step_.time - start_time_) - velocity;

@@ -172,30 +172,24 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
 }
 
 /// Starts every rod from where its velocities lead when that is lower than the start.
-void NewtonSolver::predict(const State &start) {
+void NewtonSolver::predict() {
   const DofMap &dofs = potential_->dofs();
   const double *freedom = potential_->elements().freedom();
-  const StageRule *rule = potential_->step().rule;
-  const Combination guess = rule ? rule->guess : Combination().add(potential_->step().dt, start);
-  // Backward Euler's velocities are the last step's chords; others are tangents of the motion, and say nothing of
-  // lengths at that accuracy.
-  const RetractionKind along = rule && rule->half ? RetractionKind::additive
-                               : rule             ? RetractionKind::kept
-                                                  : RetractionKind::continued;
+  const StageRule &rule = *potential_->step().rule;
   const RetractionKind kind =
-      potential_->settings.retraction == RetractionKind::length ? along : potential_->settings.retraction;
+      potential_->settings.retraction == RetractionKind::length ? rule.lengths : potential_->settings.retraction;
   for (int r = rods_.begin; r < rods_.end; ++r) {
     const RodRange &rod = dofs.rods()[r];
     for (int i = 0; i < rod.vertices; ++i)
-      work_->increment.setVector(0, rod.slot(i), freedom[rod.slot(i)] * guess.atVertex(rod.first_vertex + i));
+      work_->increment.setVector(0, rod.slot(i), freedom[rod.slot(i)] * rule.guess.atVertex(rod.first_vertex + i));
     for (int i = 0; i < rod.edges; ++i)
-      work_->increment[3][rod.slot(i)] = rod.twist ? guess.atEdge(rod.first_edge + i) : 0;
+      work_->increment[3][rod.slot(i)] = rod.twist ? rule.guess.atEdge(rod.first_edge + i) : 0;
     dofs.copyBehindRing(rod, work_->increment);
     if (!potential_->tryMove(work_->increment, 1, r, kind, work_->trial)) continue;
     const IncrementalPotential::RodEnergy energy = potential_->rodEnergy(work_->trial, r);
     if (!(energy.value < energyAtIterate(r).value)) continue;
     potential_->accept(work_->trial, r);
-    if (along == RetractionKind::additive) potential_->resetAxialForces(r);
+    if (rule.lengths == RetractionKind::additive) potential_->resetAxialForces(r);
     work_->energy[r] = energy;
     work_->energy_known[r] = potential_->scene().moments.empty();
   }

@@ -295,7 +295,7 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
       else if (complete)
         potential_->setAxialForces(r, guess->axial_force[0]);
   } else if (!is_static)
-    predict(start);
+    predict();
   if (const std::string &barrier = potential_->beyondBarrier(); !barrier.empty())
     failure = barrier;
   else

@@ -4,26 +4,6 @@ namespace tendril {
 
 using C = Configuration;
 
-void commitChords(const Elements &elements, const Configuration &start, const Configuration &iterate, double dt,
-                  RodSet rods, State &state) {
-  for (int r = rods.begin; r < rods.end; ++r) {
-    const RodRange &rod = elements.rods[r];
-    const double rate = 1 / dt;
-    for (int a = 0; a < 3; ++a) { // plane by plane
-      const double *now = iterate[C::Plane(C::position + a)] + rod.first_slot,
-                   *before = start[C::Plane(C::position + a)] + rod.first_slot;
-      const double *low = iterate[C::Plane(C::position_low + a)] + rod.first_slot,
-                   *low_before = start[C::Plane(C::position_low + a)] + rod.first_slot;
-      for (int i = 0; i < rod.vertices; ++i)
-        state.velocity[rod.first_vertex + i][a] = ((now[i] - before[i]) + (low[i] - low_before[i])) * rate;
-    }
-    for (int i = 0; i < rod.edges; i += lanes) {
-      const Pack spun = spinOver(start, iterate, rod.slot(i)) * Pack(rate);
-      for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) state.twist_rate[rod.first_edge + i + l] = spun[l];
-    }
-  }
-}
-
 [[gnu::flatten]] void commitConfiguration(const Elements &elements, const Configuration &iterate, RodSet rods,
                                           State &state) {
   for (int r = rods.begin; r < rods.end; ++r) {
@@ -51,35 +31,41 @@ void commitChords(const Elements &elements, const Configuration &start, const Co
   }
 }
 
-[[gnu::flatten]] StageRates stageRates(const Elements &elements, const Configuration &start,
-                                       const Configuration &twist_reference, const Configuration &iterate, double dt,
-                                       const StageRule &rule) {
-  StageRates rates;
-  for (Rates *part : {&rates.displacement, &rates.velocity, &rates.acceleration}) {
+[[gnu::flatten]] void stageRates(const Elements &elements, const Configuration &start,
+                                 const Configuration &twist_reference, const Configuration &iterate,
+                                 const StageRule &rule, RodSet rods, StageRates &out) {
+  const double rate = 1 / rule.dt;
+  for (Rates *part : {&out.displacement, &out.velocity, &out.acceleration}) {
+    if (part == &out.acceleration && !rule.wants_accelerations) continue;
     part->vertex.resize(elements.vertices());
     part->edge.resize(elements.edges());
   }
-  const double rate = 1 / dt;
-  for (const RodRange &rod : elements.rods) {
-    for (int i = 0; i < rod.vertices; ++i) {
-      const int v = rod.first_vertex + i;
-      const Vec3 d = iterate.displacementAt(rod.slot(i), start), velocity = d * rate + rule.velocity.atVertex(v);
-      rates.displacement.vertex[v] = d;
-      rates.velocity.vertex[v] = velocity;
-      rates.acceleration.vertex[v] = (rule.mass * velocity + rule.acceleration.atVertex(v)) * rate;
+  for (int r = rods.begin; r < rods.end; ++r) {
+    const RodRange &rod = elements.rods[r];
+    for (int a = 0; a < 3; ++a) { // plane by plane
+      const double *now = iterate[C::Plane(C::position + a)] + rod.first_slot,
+                   *before = start[C::Plane(C::position + a)] + rod.first_slot;
+      const double *low = iterate[C::Plane(C::position_low + a)] + rod.first_slot,
+                   *low_before = start[C::Plane(C::position_low + a)] + rod.first_slot;
+      for (int i = 0; i < rod.vertices; ++i) {
+        const double d = (now[i] - before[i]) + (low[i] - low_before[i]);
+        out.displacement.vertex[rod.first_vertex + i][a] = d;
+        out.velocity.vertex[rod.first_vertex + i][a] = d * rate;
+      }
     }
     for (int i = 0; i < rod.edges; i += lanes) {
-      const Pack spun = spinOver(twist_reference, iterate, rod.slot(i));
+      const Pack d = spinOver(twist_reference, iterate, rod.slot(i));
       for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) {
-        const int e = rod.first_edge + i + l;
-        const double d = spun[l], velocity = d * rate + rule.velocity.atEdge(e);
-        rates.displacement.edge[e] = d;
-        rates.velocity.edge[e] = velocity;
-        rates.acceleration.edge[e] = (rule.mass * velocity + rule.acceleration.atEdge(e)) * rate;
+        out.displacement.edge[rod.first_edge + i + l] = d[l];
+        out.velocity.edge[rod.first_edge + i + l] = d[l] * rate;
       }
     }
   }
-  return rates;
+  const Piece piece(elements, rods);
+  rule.velocity.addTo(1, piece, out.velocity.vertex, out.velocity.edge);
+  if (!rule.wants_accelerations) return;
+  Combination().add(rule.mass * rate, out.velocity).assignTo(piece, out.acceleration.vertex, out.acceleration.edge);
+  rule.acceleration.addTo(rate, piece, out.acceleration.vertex, out.acceleration.edge);
 }
 
 } // namespace tendril

@@ -174,6 +174,16 @@ void carryFrames(const StageRule &rule, const Elements &elements, int r, const C
   }
 }
 
+StageRule backwardEuler(const State &start, double dt) {
+  StageRule rule;
+  rule.dt = rule.damping_dt = dt;
+  rule.acceleration.add(-1, start);
+  rule.guess.add(dt, start);
+  rule.lengths = RetractionKind::continued;
+  rule.carries_frames = rule.wants_accelerations = false;
+  return rule;
+}
+
 Configuration configurationOf(const State &state, const Scene &scene, const Elements &elements, double motion_time) {
   Configuration c(elements.slots);
   setSupports(scene, elements, motion_time, c);

@@ -45,6 +45,30 @@ private:
   double load_reach_ = 0; ///< what the whole load would move them by at first, ...
   double rounding_ = 0;   ///< ... and what rounding of coordinates does
 
+  /// How far a run has come.
+  struct Walk {
+    Point direction;                            ///< tangent of the path at the state
+    double length = 0, first = 0, shortest = 0; ///< of the next step, the first one, and the least
+    int taken = 0, rejected = 0, in_vain = 0;   ///< steps; rejected since the last one taken, and their iterations
+    double energy = 0;                          ///< of the state [J]
+  };
+  /// A step that is tried.
+  struct Tried {
+    State start;
+    Point before; ///< the step before
+    Point end;    ///< tangent of the path at its end
+    bool converged = false;
+    bool crossed = false; ///< the count of negative pivots has changed
+    /// Whether the load factor rises at one end and falls at the other.
+    bool turns(const Walk &walk) const { return walk.direction.factor * end.factor < 0; }
+  };
+
+  PetscErrorCode beginWalk(const State &state, Walk *walk);
+  PetscErrorCode tryStep(const State &state, const Walk &walk, Tried *now);
+  PetscErrorCode shorten(State &state, const Tried &failed, Walk *walk);
+  PetscErrorCode passCritical(const Tried &now, const Walk &walk, State &state, bool *ends, bool *switched);
+  Diagnostics rowOf(const State &state, const EnergyBudget &energy, const Work &work, Walk *walk) const;
+  EnergyBudget energyOf(const State &at) const;
   double product(const Point &a, const Point &b) const;
   double size(const Point &p) const;
   double allowance(const Point &moved) const;

@@ -8,11 +8,13 @@
 #include "tendril/solver/step_solver.hpp"
 #include "tendril/state/stage.hpp"
 
+#include <deque>
+
 namespace tendril {
 
 class Integrator {
 public:
-  using Stages = std::vector<StageRates>; ///< those of a step that are done
+  using Stages = std::deque<StageRates>; ///< those of a step that are done; they stay where they are
   virtual ~Integrator() = default;
   virtual int order() const { return 2; }
   /// Least number of stages of the step that follows a state.
@@ -26,10 +28,6 @@ public:
   /// Whether the last stage is the end of the step; else `end` has the displacements there, as `guess` and `halfway`.
   virtual bool endsAtStage() const { return true; }
   virtual StageRule end(const State & /*start*/, double /*h*/, const Stages & /*done*/) const { return {}; }
-  /// Whether the velocities of states are the chords of steps, that and nothing else, as backward Euler's are. Its
-  /// steps need no rule, Newton starts where lengths go on as in the last step, and blocks of rods are committed as
-  /// they converge.
-  virtual bool leavesChords() const { return false; }
   /// How many sets of State::strains are wanted, where stiffness dissipates.
   virtual int remembersStrains() const { return 0; }
   /// How many sets of State::support_actions are wanted.
@@ -47,8 +45,14 @@ public:
   }
   /// Local error of the displacements of a step, to leading order; empty where nothing is known yet.
   virtual Combination error(const State &start, double h, const Stages &done) const = 0;
-  /// Velocities and memory after the step; everything else of the state is still that at the start.
-  virtual void finish(State &state, double h, const Stages &done) const = 0;
+  /// Velocities at the end of the step.
+  virtual Combination velocity(const State & /*start*/, double /*h*/, const Stages &done) const {
+    return Combination().add(1, done.back().velocity);
+  }
+  /// What the state at the end remembers.
+  virtual std::vector<Combination> remembers(const State & /*start*/, double /*h*/, const Stages & /*done*/) const {
+    return {};
+  }
 };
 
 /// Accelerations of a state from the forces on it. \param h about the length of a step [s]

@@ -73,11 +73,12 @@ private:
   LoopSettings settings_;
   std::string failure_;
   std::unique_ptr<Integrator> integrator_;
-  Integrator::Stages stages_;          ///< of the step under way
-  double located_ = -1;                ///< last critical load factor
-  std::optional<Planes> mode_;         ///< critical mode along which the next step begins
-  std::vector<Holder> moving_;         ///< supports and constraints
-  std::vector<HolderActions> actions_; ///< of those, at each stage of the step under way
+  Integrator::Stages stages_;               ///< of the step under way
+  double located_ = -1;                     ///< last critical load factor
+  std::optional<Planes> mode_;              ///< critical mode along which the next step begins
+  std::vector<Holder> moving_;              ///< supports and constraints
+  std::vector<std::vector<int>> moving_of_; ///< per rod; empty where nothing moves
+  std::vector<HolderActions> actions_;      ///< of those, at each stage of the step under way
 
   /// Error of the step under way, and what it moved: the largest of any rod, root mean square over its length [turns in
   /// rad].
@@ -93,7 +94,7 @@ private:
     EnergyBudget energy;
     StepError error;
     bool too_coarse = false; ///< for the error asked for
-    void addEnergy(const IncrementalPotential &potential, const State &end, int rod);
+    void commit(const IncrementalPotential &potential, RodSet rods, State *next);
   };
   PetscErrorCode attempt(const State &state, State *next, Attempt *now);
   bool mayPassCritical(const State &state, const NewtonReport &report) const;
@@ -104,16 +105,13 @@ private:
   double longest() const;
   double shortest() const;
   bool adapts() const { return settings_.dynamic && settings_.adapt == Adaptation::error; }
-  /// Whether blocks are committed one by one: in one stage, whose end is that of the step.
-  bool isPlain() const {
-    return !settings_.dynamic || (integrator_->leavesChords() && !adapts() && !settings_.estimate_error);
-  }
-  PetscErrorCode solveStages(const State &start, const Step &step, NewtonReport *report);
+  PetscErrorCode solveStages(const State &start, State *next, Attempt *now);
   StepError stepError(const State &start, double h) const;
   void noteActions(const State &start, RodSet rods);
+  void finish(const State &start, double h, RodSet rods, State *next);
   Work dynamicWork(const State &start, double h) const;
   double movedKinetic(const State &state) const;
-  void finishStages(State &state, double h);
+  void remember(const State &start, double h, State *next) const;
   double nextStep(double time, double *landing) const;
   bool adapt(double h, double dt_min, const StepError &error);
   PetscErrorCode locate(State &start, const Step &step, bool *moved);

@@ -22,7 +22,8 @@ struct Step {
   double load_factor = 1; ///< on gravity, forces, torques and moments
   bool mixed = true;      ///< axial force as its own unknown, condensed edge by edge
   HessianKind hessian = HessianKind::exact;
-  const StageRule *rule = nullptr; ///< of the stage, with the same dt; null: backward Euler
+  const StageRule *rule = nullptr; ///< of the stage, with the same dt; IncrementalPotential::beginStep takes
+                                   ///< backward Euler where a step in time has none
   const Configuration *twist_reference =
       nullptr; ///< frames from which twist is measured (carryFrames); null: those of the start
   double dampingDt() const { return rule ? rule->damping_dt : dt; }

@@ -127,9 +127,9 @@ public:
   bool hasLoad(int rod) const { return scales_[rod].load > 0; }
   const AxialLaw &axial() const { return axial_; }
 
-  /// Displacements of the iterate since the step began, and the rates that follow from them by a rule.
-  StageRates stageRates(const StageRule &rule) const {
-    return tendril::stageRates(elements_, start_, twistReference(), iterate_, step_.dt, rule);
+  /// Displacements of the iterate of some rods since the step began, and the rates that follow from them by its rule.
+  void stageRates(RodSet rods, StageRates &out) const {
+    tendril::stageRates(elements_, start_, twistReference(), iterate_, *step_.rule, rods, out);
   }
   /// Force [N] and moment [N m] of a support or constraint on its rod at the iterate, without the inertia of a held
   /// vertex itself.
@@ -144,24 +144,12 @@ public:
   /// configuration.
   bool moveOn(double time, const StageRule &end);
 
-  /// State of some rods after the step: positions, directors made orthonormal, axial forces; and the velocities of
-  /// backward Euler.
+  /// State of some rods after the step: positions, directors made orthonormal, axial forces.
   void commitConfiguration(State &state, RodSet rods) const {
     tendril::commitConfiguration(elements_, iterate_, rods, state);
   }
-  void commit(State &state, RodSet rods) const {
-    if (!step_.isStatic()) commitChords(elements_, start_, iterate_, step_.dt, rods, state);
-    commitConfiguration(state, rods);
-  }
-  /// Of all, with the time.
-  void commitConfiguration(State &state) const {
-    commitConfiguration(state, all());
-    commitTime(state);
-  }
-  void commit(State &state) const {
-    commit(state, all());
-    commitTime(state);
-  }
+  /// Of all, with the time; in steps in time the velocities are those of the stage.
+  void commit(State &state) const;
 
 private:
   const Scene &scene_;
@@ -171,6 +159,7 @@ private:
   AxialLaw axial_;
   std::vector<std::unique_ptr<Term>> terms_;
   Step step_;
+  StageRule euler_; ///< where a step has no rule of its own
   double start_time_ = 0;
   SupportMotion supports_;
   Configuration start_, iterate_;
@@ -183,10 +172,6 @@ private:
   std::vector<Known> known_; ///< per rod: what derivatives_ holds of the iterate
   std::vector<RodScale> scales_;
 
-  void commitTime(State &state) const {
-    state.time = step_.time;
-    ++state.step;
-  }
   double reachOf(const Configuration &configuration, const RodRange &rod) const;
   double steepnessOf(const Configuration &configuration, int rod) const;
 };

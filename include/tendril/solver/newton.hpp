@@ -197,7 +197,7 @@ private:
   double turningOf(int rod) const;
   PetscErrorCode findBucklingModes(std::vector<char> *found, std::vector<char> *neutral);
   PetscErrorCode escapeSaddle(bool *left, bool *neutral);
-  void predict(const State &start);
+  void predict();
   const IncrementalPotential::RodEnergy &energyAtIterate(int rod);
   void forgetEnergies() { fill(work_->energy_known, false); }
   /// Moves what is shared with other blocks here.

@@ -8,12 +8,9 @@ namespace tendril {
 
 /// Positions, directors made orthonormal, whole turns, axial forces.
 void commitConfiguration(const Elements &elements, const Configuration &iterate, RodSet rods, State &state);
-/// Velocities and twist rates of backward Euler: displacements and spins since the start over the step [s].
-void commitChords(const Elements &elements, const Configuration &start, const Configuration &iterate, double dt,
-                  RodSet rods, State &state);
-/// Displacements since the step began, and the rates that follow from them by a rule.
+/// Displacements of some rods since the step began, and the rates that follow from them by a rule.
 /// \param twist_reference frames from which twist is measured
-StageRates stageRates(const Elements &elements, const Configuration &start, const Configuration &twist_reference,
-                      const Configuration &iterate, double dt, const StageRule &rule);
+void stageRates(const Elements &elements, const Configuration &start, const Configuration &twist_reference,
+                const Configuration &iterate, const StageRule &rule, RodSet rods, StageRates &out);
 
 } // namespace tendril

@@ -3,9 +3,22 @@
 /// How displacements, velocities and accelerations hang together in one stage of a time step: all that an integrator
 /// tells the incremental potential.
 
-#include "tendril/state/state.hpp"
+#include "tendril/layout/rod_range.hpp"
+#include "tendril/state/retraction.hpp"
 
 namespace tendril {
+
+/// Vertices and edges of rods that follow each other, [begin, end) in the order of the scene.
+struct Piece {
+  int vertex, vertex_end, edge, edge_end;
+  Piece(const Elements &elements, RodSet rods)
+      : vertex(elements.rods[rods.begin].first_vertex), vertex_end(vertex), edge(elements.rods[rods.begin].first_edge),
+        edge_end(edge) {
+    const RodRange &last = elements.rods[rods.end - 1];
+    vertex_end = last.first_vertex + last.vertices;
+    edge_end = last.first_edge + last.edges;
+  }
+};
 
 /// Sum of rates with weights.
 class Combination {
@@ -28,14 +41,30 @@ public:
     for (const Part &p : parts_) sum += p.weight * (*p.edge)[e];
     return sum;
   }
-
-private:
   struct Part {
     double weight;
     const std::vector<Vec3> *vertex;
     const std::vector<double> *edge;
   };
+  const std::vector<Part> &parts() const { return parts_; }
+  /// Adds a multiple of it to what is there, or puts it there.
+  void addTo(double factor, const Piece &piece, std::vector<Vec3> &vertex, std::vector<double> &edge) const {
+    for (const Part &p : parts_) add(factor * p.weight, p, piece, vertex, edge, true);
+  }
+  void assignTo(const Piece &piece, std::vector<Vec3> &vertex, std::vector<double> &edge) const {
+    for (std::size_t k = 0; k < parts_.size(); ++k) add(parts_[k].weight, parts_[k], piece, vertex, edge, k > 0);
+  }
+
+private:
   std::vector<Part> parts_;
+
+  static void add(double weight, const Part &part, const Piece &piece, std::vector<Vec3> &vertex,
+                  std::vector<double> &edge, bool to_what_is_there) {
+    for (int v = piece.vertex; v < piece.vertex_end; ++v)
+      vertex[v] = to_what_is_there ? Vec3(vertex[v] + weight * (*part.vertex)[v]) : Vec3(weight * (*part.vertex)[v]);
+    for (int e = piece.edge; e < piece.edge_end; ++e)
+      edge[e] = to_what_is_there ? edge[e] + weight * (*part.edge)[e] : weight * (*part.edge)[e];
+  }
 };
 
 /// With d the displacements and spins since the start of the step:
@@ -57,8 +86,11 @@ struct StageRule {
   Combination guess;          ///< of d, to start Newton from [m]
   Combination halfway; ///< of d, half-way in time to the guess: frames follow the curve through both (carryFrames);
                        ///< empty: a great circle [m]
-  const Rates *half = nullptr; ///< displacements to the middle of the step: axial forces come from the mean of the
-                               ///< strains at both its ends (AxialLaw)
+  RetractionKind lengths = RetractionKind::kept; ///< how edges get longer along the guess
+  bool carries_frames = true; ///< whether twist is measured from frames carried along the guess, or those of the start
+  bool wants_accelerations = true; ///< whether the method goes on with those of this stage
+  const Rates *half = nullptr;     ///< displacements to the middle of the step: axial forces come from the mean of the
+                                   ///< strains at both its ends (AxialLaw)
 };
 
 /// Frames of a rod from which a stage measures twist: those of the start, carried to where the guess leads. Twist
@@ -68,10 +100,14 @@ struct StageRule {
 void carryFrames(const StageRule &rule, const Elements &elements, int rod, const Configuration &from,
                  Configuration &reference);
 
+/// Backward Euler over a step of length dt [s]: v = d/dt, a = (v - v_n)/dt. Its velocities are the chords of steps, so
+/// that Newton starts where lengths go on as in the last step; frames are those of the start, at its order.
+StageRule backwardEuler(const State &start, double dt);
+
 /// What a stage found.
 struct StageRates {
-  Rates displacement, velocity, acceleration;
-  std::vector<double> strains; ///< as in State; only where something dissipates by them
+  Rates displacement, velocity, acceleration; ///< accelerations where the rule wants them
+  std::vector<double> strains;                ///< as in State; only where something dissipates by them
 };
 
 } // namespace tendril

@@ -23,6 +23,7 @@ public:
     const double w = h / start.last_dt, r = (1 + 2 * w) / (1 + w), c = w * w / (1 + w);
     StageRule rule;
     rule.dt = rule.damping_dt = h / r;
+    rule.wants_accelerations = false;
     rule.velocity.add(-c / w, start.memory[chord]);
     rule.acceleration.add(-1 - c / r, start).add(c / r, start.memory[velocity]);
     rule.guess.add(h * (1 + 0.5 * w), start).add(-0.5 * h * w, start.memory[velocity]);
@@ -40,14 +41,8 @@ public:
         .add(third * w / h, start.memory[velocity]);
   }
 
-  void finish(State &state, double h, const Stages &done) const override {
-    state.memory.resize(2);
-    Rates &mean = state.memory[chord], &last = state.memory[velocity];
-    mean = done.back().displacement;
-    for (Vec3 &v : mean.vertex) v /= h;
-    for (double &v : mean.edge) v /= h;
-    last.vertex = std::exchange(state.velocity, done.back().velocity.vertex);
-    last.edge = std::exchange(state.twist_rate, done.back().velocity.edge);
+  std::vector<Combination> remembers(const State &start, double h, const Stages &done) const override {
+    return {Combination().add(1 / h, done.back().displacement), Combination().add(1, start)};
   }
 
 private:

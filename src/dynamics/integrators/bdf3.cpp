@@ -34,6 +34,7 @@ public:
     const Rates &v1 = start.memory[velocity1], &v2 = start.memory[velocity2];
     StageRule rule;
     rule.dt = rule.damping_dt = h / w.r;
+    rule.wants_accelerations = false;
     rule.velocity.add(-w.q, start.memory[chord1]).add(w.p, start.memory[chord2]);
     const double q = rule.dt * w.q / w.h1, p = rule.dt * w.p / w.h2;
     rule.acceleration.add(-1 - q, start).add(q + p, v1).add(-p, v2);
@@ -60,20 +61,14 @@ public:
         .add(-fourth / (w.H2 * between * w.h2), start.memory[velocity2]);
   }
 
-  void finish(State &state, double h, const Stages &done) const override {
-    std::vector<Rates> memory(2);
-    Rates &mean = memory[chord1], &last = memory[velocity1];
-    mean = done.back().displacement;
-    for (Vec3 &v : mean.vertex) v /= h;
-    for (double &v : mean.edge) v /= h;
-    last = {std::exchange(state.velocity, done.back().velocity.vertex),
-            std::exchange(state.twist_rate, done.back().velocity.edge)};
-    if (state.memory.size() == 1) // before the second step
-      memory.push_back(done.back().acceleration);
+  std::vector<Combination> remembers(const State &start, double h, const Stages &done) const override {
+    std::vector<Combination> memory{Combination().add(1 / h, done.back().displacement), Combination().add(1, start)};
+    if (start.memory.size() == 1) // before the second step
+      memory.push_back(Combination().add(1, done.back().acceleration));
     else
-      memory.insert(memory.end(), std::make_move_iterator(state.memory.begin()),
-                    std::make_move_iterator(state.memory.begin() + 2));
-    state.memory = std::move(memory);
+      memory.insert(memory.end(),
+                    {Combination().add(1, start.memory[chord1]), Combination().add(1, start.memory[velocity1])});
+    return memory;
   }
 
 private:

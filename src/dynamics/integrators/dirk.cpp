@@ -93,19 +93,16 @@ public:
     return error;
   }
 
-  void finish(State &state, double h, const Stages &done) const override {
-    if (order_ > 2) state.memory = {done.back().acceleration};
-    if (stiffly_accurate_) {
-      state.velocity = done.back().velocity.vertex;
-      state.twist_rate = done.back().velocity.edge;
-      return;
-    }
-    for (int k = 0; k < stages_; ++k) {
-      for (std::size_t v = 0; v < state.velocity.size(); ++v)
-        state.velocity[v] += h * b_[k] * done[k].acceleration.vertex[v];
-      for (std::size_t e = 0; e < state.twist_rate.size(); ++e)
-        state.twist_rate[e] += h * b_[k] * done[k].acceleration.edge[e];
-    }
+  Combination velocity(const State &start, double h, const Stages &done) const override {
+    if (stiffly_accurate_) return Integrator::velocity(start, h, done);
+    Combination sum;
+    sum.add(1, start);
+    for (int k = 0; k < stages_; ++k) sum.add(h * b_[k], done[k].acceleration);
+    return sum;
+  }
+  std::vector<Combination> remembers(const State &, double, const Stages &done) const override {
+    if (order_ > 2) return {Combination().add(1, done.back().acceleration)};
+    return {};
   }
 
 private:

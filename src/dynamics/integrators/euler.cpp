@@ -7,24 +7,12 @@ namespace {
 class Euler final : public Integrator {
 public:
   int order() const override { return 1; }
-  bool leavesChords() const override { return true; }
 
-  StageRule stage(const State &start, double h, const Stages &) const override {
-    StageRule rule;
-    rule.dt = rule.damping_dt = h;
-    rule.acceleration.add(-1, start);
-    rule.guess.add(h, start);
-    return rule;
-  }
+  StageRule stage(const State &start, double h, const Stages &) const override { return backwardEuler(start, h); }
 
-  /// h^2/2 x''.
-  Combination error(const State &, double h, const Stages &done) const override {
-    return Combination().add(0.5 * h * h, done[0].acceleration);
-  }
-
-  void finish(State &state, double, const Stages &done) const override {
-    state.velocity = done[0].velocity.vertex;
-    state.twist_rate = done[0].velocity.edge;
+  /// h^2/2 x'', by the difference of the velocities.
+  Combination error(const State &start, double h, const Stages &done) const override {
+    return Combination().add(0.5 * h, done[0].velocity).add(-0.5 * h, start);
   }
 };
 

@@ -54,16 +54,11 @@ public:
     return Combination().add(third, done[0].acceleration).add(-third, start.memory[motion]);
   }
 
-  void finish(State &state, double h, const Stages &done) const override {
+  std::vector<Combination> remembers(const State &start, double h, const Stages &done) const override {
     Combination next;
-    next.add((1 - af_) / (1 - am_), done[0].acceleration).add(af_ / (1 - am_), state.memory[motion]);
-    lagged(next, -am_ / (1 - am_), state, h);
-    Rates method = done[0].acceleration;
-    for (std::size_t v = 0; v < method.vertex.size(); ++v) method.vertex[v] = next.atVertex(int(v));
-    for (std::size_t e = 0; e < method.edge.size(); ++e) method.edge[e] = next.atEdge(int(e));
-    state.memory = {done[0].acceleration, std::move(method)};
-    state.velocity = done[0].velocity.vertex;
-    state.twist_rate = done[0].velocity.edge;
+    next.add((1 - af_) / (1 - am_), done[0].acceleration).add(af_ / (1 - am_), start.memory[motion]);
+    lagged(next, -am_ / (1 - am_), start, h);
+    return {Combination().add(1, done[0].acceleration), next};
   }
 
 private:

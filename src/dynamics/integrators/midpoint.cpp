@@ -37,6 +37,7 @@ public:
       rule.guess.add(0.5 * h, start).add(0.125 * h * h, start.memory[0]);
     else {
       rule.half = &done.back().displacement;
+      rule.lengths = RetractionKind::additive;
       rule.guess.add(1, *rule.half);
     }
     if (start.strains.empty()) return rule;
@@ -60,12 +61,11 @@ public:
     return Combination().add(third, done.back().acceleration).add(-third, start.memory[0]);
   }
 
-  void finish(State &state, double, const Stages &done) const override {
-    for (std::size_t v = 0; v < state.velocity.size(); ++v)
-      state.velocity[v] = 2 * done.back().velocity.vertex[v] - state.velocity[v];
-    for (std::size_t e = 0; e < state.twist_rate.size(); ++e)
-      state.twist_rate[e] = 2 * done.back().velocity.edge[e] - state.twist_rate[e];
-    state.memory = {done.back().acceleration};
+  Combination velocity(const State &start, double, const Stages &done) const override {
+    return Combination().add(2, done.back().velocity).add(-1, start);
+  }
+  std::vector<Combination> remembers(const State &, double, const Stages &done) const override {
+    return {Combination().add(1, done.back().acceleration)};
   }
 
 private:
