@@ -263,12 +263,9 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, Seek seek, const Guess *guess,
-                                   int patience) {
-  constexpr int most_rounds = 4; // of a tolerance made sharper
-  std::string failure;
+/// Makes all ready for a solve, and moves the iterate to where it begins.
+void NewtonSolver::begin(const State &start, Seek seek, const Guess *guess, int patience) {
   const bool is_static = potential_->step().isStatic();
-  PetscFunctionBeginUser;
   focus();
   system_.edge_metric =
       is_static ? work_->edge_metric.data() : nullptr; // in dynamics, inertia is what holds short waves
@@ -279,107 +276,60 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
   patience_ = patience;
   sharpness_ = 1;
   likely_ = spent_ = 0;
+  fill(work_->last_shift, 0.0); // a step depends on its start alone
+  for (int r = rods_.begin; r < rods_.end; ++r) potential_->beginRod(start, r);
+  forgetEnergies();
+  if (!guess) {
+    if (!is_static) predict();
+    return;
+  }
+  const bool complete = guess->axial_force.size() > 0;
+  const bool possible = potential_->moveTo(guess->unknowns, rods_, complete);
+  for (int r = rods_.begin; r < rods_.end; ++r)
+    if (!possible)
+      potential_->beginRod(start, r); // from the start, then
+    else if (complete)
+      potential_->setAxialForces(r, guess->axial_force[0]);
+}
+
+/// Whether what is left is little; else Newton goes on to a sharper tolerance, `along` as it seeks.
+PetscErrorCode NewtonSolver::settle(Seek along, Outcome *now) {
+  constexpr int most_rounds = 4; // of a tolerance made sharper
+  PetscFunctionBeginUser;
+  PetscCall(verify(&now->settled));
+  if (now->settled) PetscFunctionReturn(0);
+  if (++now->rounds == most_rounds) {
+    now->failure = lost_;
+    report_.lost = true;
+    PetscFunctionReturn(0);
+  }
+  sharpness_ *= 1e-2;
+  seek_ = along;
+  PetscCall(newton(&now->failure));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, Seek seek, const Guess *guess,
+                                   int patience) {
+  PetscFunctionBeginUser;
+  begin(start, seek, guess, patience);
   const Doing here([this](std::ostream &out) {
     out << "Newton iteration " << spent_ + report_.iterations;
     if (rtol_ > 0) out << ", out of balance by " << excess(report_.residual, rtol_) << " times what is asked for";
   });
-  fill(work_->last_shift, 0.0); // a step depends on its start alone
-  for (int r = rods_.begin; r < rods_.end; ++r) potential_->beginRod(start, r);
-  forgetEnergies();
-  if (guess) {
-    const bool complete = guess->axial_force.size() > 0;
-    const bool possible = potential_->moveTo(guess->unknowns, rods_, complete);
-    for (int r = rods_.begin; r < rods_.end; ++r)
-      if (!possible)
-        potential_->beginRod(start, r); // from the start, then
-      else if (complete)
-        potential_->setAxialForces(r, guess->axial_force[0]);
-  } else if (!is_static)
-    predict();
-  if (const std::string &barrier = potential_->beyondBarrier(); !barrier.empty())
-    failure = barrier;
-  else
-    PetscCall(newton(&failure));
-  // In statics the answer must be a minimum, and the Hessian there says how far from it the iterate still is.
-  int rounds = 0;
-  bool settled = false;
-  std::string beyond; // the limit of a law
-  // Whether what is left is little; else Newton goes on to a sharper tolerance, `along` as it seeks.
-  auto settle = [&](Seek along) {
-    PetscFunctionBeginUser;
-    PetscCall(verify(&settled));
-    if (settled) PetscFunctionReturn(0);
-    if (++rounds == most_rounds) {
-      failure = lost_;
-      report_.lost = true;
-      PetscFunctionReturn(0);
-    }
-    sharpness_ *= 1e-2;
-    seek_ = along;
-    PetscCall(newton(&failure));
-    PetscFunctionReturn(0);
-  };
-  for (int k = 0; is_static && failure.empty() && !settled; ++k) {
-    int negative;
-    PetscCall(inertiaAtIterate(&negative));
-    report_.negative_pivots = negative;
-    if (k == 0) report_.first_negative_pivots = negative;
-    if (seek == Seek::equilibrium && negative >= 0) break;
-    if (negative > 0)
-      beyond = limitOfLaw(*potential_, rods_, potential_->iterate(), 1, std::sqrt(2.0 / 3),
-                          std::sqrt(1.0 / 3)); // where an edge gives way, the load falls
-    if (!beyond.empty()) {
-      failure = "the equilibrium is unstable" + beyond;
-      break;
-    }
-    for (int r = rods_.begin; r < rods_.end && negative > 0 && circulatory_; ++r) // couples: no minimum to speak of
-      if (circulatory_->acts(r)) negative -= std::exchange(work_->negative[r], 0);
-    if (negative == 0) {
-      PetscCall(settle(seek_));
-      continue;
-    }
-    const bool creeps = creeps_;
-    bool left = false, neutral = false;
-    const std::string unstable = unstableRod();
-    if (negative > 0 && k < 10) PetscCall(escapeSaddle(&left, &neutral));
-    if (neutral && !left) { // no way down, but what loads move along it has to be found
-      PetscCall(inertiaAtIterate(&negative));
-      report_.zero_pivots += std::max(0, negative);
-      report_.negative_pivots = 0;
-      if (k == 0) report_.first_negative_pivots = 0;
-      const bool descends = creeps && potential_->elements().edges() <= most_searched_edges;
-      Configuration here;
-      if (descends) here = potential_->iterate();
-      PetscCall(settle(Seek::equilibrium)); // Newton's own steps: a shift would drown the soft direction
-      if (failure.empty() || report_.lost || !descends) continue;
-      // The way down that was crept along is there, if too flat for its curvature to be told from rounding.
-      for (int r = rods_.begin; r < rods_.end; ++r) potential_->accept(here, r);
-      forgetEnergies();
-      seek_ = seek;
-      descends_ = true;
-      PetscCall(newton(&failure));
-      descends_ = false;
-      continue;
-    }
-    seek_ = seek;
-    if (!left) {
-      failure = negative < 0
-                    ? "the Hessian cannot be factored" +
-                          tellImbalance(*potential_, farthestRod(*potential_, rods_, asked()), asked())
-                    : "the equilibrium is unstable (negative pivots) and no way down from it was found" + unstable;
-      break;
-    }
-    sharpness_ *= 1e-2; // close to a branching the forces are small far from the equilibrium
-    PetscCall(newton(&failure));
-  }
-  report_.converged = failure.empty();
+  Outcome now;
+  now.failure = potential_->beyondBarrier();
+  if (now.failure.empty()) PetscCall(newton(&now.failure));
+  if (potential_->step().isStatic()) PetscCall(settleMinimum(seek, &now));
+  report_.converged = now.failure.empty();
   for (int r = rods_.begin; r < rods_.end; ++r)
     report_.rounding_error = std::max(report_.rounding_error, work_->left[r]);
-  report_.reason = report_.converged
-                       ? "converged"
-                       : failure + nearBarrier(*potential_, rods_) +
-                             (beyond.empty() ? limitOfLaw(*potential_, rods_, potential_->start(), 0.5, HUGE_VAL, 0.65)
-                                             : ""); // 0.88 of the moment, 0.98 of the force
+  report_.reason = "converged";
+  if (!report_.converged) {
+    report_.reason = now.failure + nearBarrier(*potential_, rods_);
+    if (now.beyond.empty()) // 0.88 of the moment, 0.98 of the force
+      report_.reason += limitOfLaw(*potential_, rods_, potential_->start(), 0.5, HUGE_VAL, 0.65);
+  }
   *report = report_;
   PetscFunctionReturn(0);
 }

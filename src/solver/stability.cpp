@@ -1,5 +1,6 @@
 /// Indefinite Hessians: descent directions from shifted ones, and the ways out of saddles.
 #include "tendril/solver/activity.hpp"
+#include "tendril/solver/hints.hpp"
 #include "tendril/solver/newton.hpp"
 
 #include <Eigen/Eigenvalues>
@@ -291,6 +292,74 @@ PetscErrorCode NewtonSolver::escapeSaddle(bool *left, bool *neutral) {
   if (!*left) PetscFunctionReturn(0);
   forgetEnergies();
   ++report_.escapes;
+  PetscFunctionReturn(0);
+}
+
+/// An equilibrium with motions that cost nothing: what loads move along them has to be found, by Newton's own steps; a
+/// shift would drown the soft direction. \param creeps whether a way down was crept along: it is there, if too flat for
+/// its curvature to be told from rounding
+PetscErrorCode NewtonSolver::settleNeutral(bool first, bool creeps, Seek seek, Outcome *now) {
+  int negative;
+  PetscFunctionBeginUser;
+  PetscCall(inertiaAtIterate(&negative));
+  report_.zero_pivots += std::max(0, negative);
+  report_.negative_pivots = 0;
+  if (first) report_.first_negative_pivots = 0;
+  const bool descends = creeps && potential_->elements().edges() <= most_searched_edges;
+  Configuration here;
+  if (descends) here = potential_->iterate();
+  PetscCall(settle(Seek::equilibrium, now));
+  if (now->failure.empty() || report_.lost || !descends) PetscFunctionReturn(0);
+  for (int r = rods_.begin; r < rods_.end; ++r) potential_->accept(here, r);
+  forgetEnergies();
+  seek_ = seek;
+  descends_ = true;
+  PetscCall(newton(&now->failure));
+  descends_ = false;
+  PetscFunctionReturn(0);
+}
+
+/// In statics the answer must be a minimum, and the Hessian there says how far from it the iterate still is.
+PetscErrorCode NewtonSolver::settleMinimum(Seek seek, Outcome *now) {
+  PetscFunctionBeginUser;
+  for (int k = 0; now->failure.empty() && !now->settled; ++k) {
+    int negative;
+    PetscCall(inertiaAtIterate(&negative));
+    report_.negative_pivots = negative;
+    if (k == 0) report_.first_negative_pivots = negative;
+    if (seek == Seek::equilibrium && negative >= 0) break;
+    if (negative > 0)
+      now->beyond = limitOfLaw(*potential_, rods_, potential_->iterate(), 1, std::sqrt(2.0 / 3),
+                               std::sqrt(1.0 / 3)); // where an edge gives way, the load falls
+    if (!now->beyond.empty()) {
+      now->failure = "the equilibrium is unstable" + now->beyond;
+      break;
+    }
+    for (int r = rods_.begin; r < rods_.end && negative > 0 && circulatory_; ++r) // couples: no minimum to speak of
+      if (circulatory_->acts(r)) negative -= std::exchange(work_->negative[r], 0);
+    if (negative == 0) {
+      PetscCall(settle(seek_, now));
+      continue;
+    }
+    const bool creeps = creeps_;
+    bool left = false, neutral = false;
+    const std::string unstable = unstableRod();
+    if (negative > 0 && k < 10) PetscCall(escapeSaddle(&left, &neutral));
+    if (neutral && !left) {
+      PetscCall(settleNeutral(k == 0, creeps, seek, now));
+      continue;
+    }
+    seek_ = seek;
+    if (!left) {
+      now->failure = negative < 0
+                         ? "the Hessian cannot be factored" +
+                               tellImbalance(*potential_, farthestRod(*potential_, rods_, asked()), asked())
+                         : "the equilibrium is unstable (negative pivots) and no way down from it was found" + unstable;
+      break;
+    }
+    sharpness_ *= 1e-2; // close to a branching the forces are small far from the equilibrium
+    PetscCall(newton(&now->failure));
+  }
   PetscFunctionReturn(0);
 }
 

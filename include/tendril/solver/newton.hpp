@@ -160,6 +160,16 @@ private:
   bool creeps_ = false;   ///< whether the last solve ended for creeping towards a saddle
   bool descends_ = false; ///< whether creeping goes on, for what ends it
 
+  /// What a solve has come to.
+  struct Outcome {
+    std::string failure, beyond; ///< why it failed; the limit of a law that is passed
+    int rounds = 0;              ///< of a tolerance made sharper
+    bool settled = false;        ///< what is left is little
+  };
+  void begin(const State &start, Seek seek, const Guess *guess, int patience);
+  PetscErrorCode settle(Seek along, Outcome *now);
+  PetscErrorCode settleNeutral(bool first, bool creeps, Seek seek, Outcome *now);
+  PetscErrorCode settleMinimum(Seek seek, Outcome *now);
   PetscErrorCode newton(std::string *failure);
   PetscErrorCode moveTo(Vec x, bool *possible);
   PetscErrorCode writeIterate(Vec x);
