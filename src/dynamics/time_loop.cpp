@@ -156,25 +156,29 @@ Diagnostics TimeLoop::rowOf(const State &state, const Attempt &now, const Work &
   return row;
 }
 
-PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finished) {
-  PetscFunctionBeginUser;
-  const Scene &scene = solver_.potential().scene();
-  const Elements &elements = solver_.potential().elements();
+/// A run that begins has no step behind it, whatever the loop has run before.
+void TimeLoop::prepare(const State &state) {
+  const IncrementalPotential &potential = solver_.potential();
+  const Scene &scene = potential.scene();
   if (control.dt == 0) control.dt = longest();
-  PetscLogDouble begin, now;
-  PetscCall(PetscTime(&begin));
-  // A run that begins has no step behind it, whatever the loop has run before.
   const bool goes_on = !std::isnan(control.energy) && (settings_.dynamic || state.time > 0);
   if (!goes_on) {
-    const Configuration start = configurationOf(state, scene, elements, state.time);
+    const Configuration start = configurationOf(state, scene, potential.elements(), state.time);
     EnergyBudget energy;
-    for (int r = 0; r < solver_.potential().all().end; ++r)
-      energy += solver_.potential().energyBudget(state, start, settings_.dynamic ? 1 : state.time, r);
+    for (int r = 0; r < potential.all().end; ++r)
+      energy += potential.energyBudget(state, start, settings_.dynamic ? 1 : state.time, r);
     control.energy = energy.total();
   }
   moving_ = movingHolders(scene);
   moving_of_.assign(moving_.empty() ? 0 : scene.rods.size(), {});
   for (std::size_t k = 0; k < moving_.size(); ++k) moving_of_[moving_[k].rod].push_back(int(k));
+}
+
+PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finished) {
+  PetscFunctionBeginUser;
+  PetscLogDouble begin, now;
+  PetscCall(PetscTime(&begin));
+  prepare(state);
   Work work;                     // since the last row
   int rejected = 0, in_vain = 0; // steps since then, and their iterations
   State next = state; // what the blocks that have converged come to; the state itself stays as it is until all have
@@ -201,7 +205,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
       *finished = moved && settings_.bifurcation == Bifurcation::stop;
       if (*finished) PetscFunctionReturn(0);
       if (moved) {
-        work += staticWork(scene, elements, before, state);
+        work += staticWork(solver_.potential().scene(), solver_.potential().elements(), before, state);
         next = state;
         control.stable = false;
         continue;

@@ -195,20 +195,9 @@ bool isOptionName(const char *word) {
 
 } // namespace
 
-PetscErrorCode readOptions(int argc, char **argv, Options *o) {
-  PetscBool set;
-  PetscFunctionBeginUser;
-  for (int i = 1; i < argc; ++i)
-    if (!isOptionName(argv[i]) && (i == 1 || !isOptionName(argv[i - 1])))
-      throw SceneError(std::string("command line: '") + argv[i] +
-                       "' belongs to no option; options begin with - and take one value (lists without blanks)");
-  Texts texts;
-  PetscCall(texts.read());
-  PetscCall(PetscOptionsHasName(nullptr, nullptr, "-help", &set));
-  o->help = set;
-  o->schema = texts.flag("-schema");
-  o->keys = texts.flag("-keys");
-  o->scene = texts.text("-scene");
+namespace {
+
+void readTime(Texts &texts, Options *o) {
   if (texts.has("-mode")) o->mode = texts.word("-mode");
   if (texts.has("-dt")) o->dt = texts.number("-dt");
   if (texts.has("-t_end")) o->t_end = texts.number("-t_end");
@@ -225,6 +214,9 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
     if (texts.isGiven(std::string("-") + name) && o->loop.adapt == Adaptation::none)
       fail(name, "needs -dt_adapt error");
   if (texts.has("-dt_adapt")) o->dynamic_only = "dt_adapt"; // -integrator may stay in statics, in sweeps over both
+}
+
+void readStatics(Texts &texts, Options *o) {
   if (texts.has("-load_steps")) o->given_load_steps = texts.integer("-load_steps");
   if (texts.has("-arclength_steps")) o->arclength_steps = texts.integer("-arclength_steps");
   o->loop.arclength_steps = texts.integer("-arclength_steps");
@@ -234,8 +226,9 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   o->loop.bifurcation =
       Bifurcation(std::find(bifurcations.begin(), bifurcations.end(), bifurcation) - bifurcations.begin());
   if (texts.has("-bifurcation")) o->bifurcation = o->loop.bifurcation;
-  if (texts.has("-gravity")) o->gravity = texts.vector("-gravity");
-  o->rod_edges = readRodEdges(texts.text("-rod_edges"));
+}
+
+void readOutput(Texts &texts, Options *o) {
   o->output_dir = texts.text("-output_dir");
   o->output_interval = o->loop.output_interval = texts.number("-output_interval");
   o->checkpoint_interval = texts.integer("-checkpoint_interval");
@@ -243,11 +236,17 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   if (texts.has("-restart_time")) o->restart_time = texts.number("-restart_time");
   if (texts.has("-time_limit")) o->time_limit = texts.number("-time_limit");
   o->fields = readFields(texts);
+}
+
+void readAccuracy(Texts &texts, Options *o) {
   o->error_estimate = o->loop.estimate_error = texts.flag("-error_estimate");
   const std::string of = texts.word("-accuracy_of");
   const Quantity quantity = of == "tip" ? Quantity::tip : of == "energy" ? Quantity::energy : Quantity::position;
   if (texts.has("-accuracy_of")) o->accuracy_of = quantity;
   if (texts.has("-accuracy")) o->accuracy = {texts.number("-accuracy"), quantity};
+}
+
+void readSolver(Texts &texts, Options *o) {
   o->loop.solve.rounding_tolerance = texts.number("-rounding_tolerance");
   o->loop.solve.retraction =
       texts.word("-retraction") == "additive" ? RetractionKind::additive : RetractionKind::length;
@@ -258,6 +257,9 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   o->loop.solve.quasi_newton = texts.integer("-quasi_newton");
   o->loop.mixed = texts.word("-stretch") == "mixed";
   o->loop.hessian = texts.word("-hessian") == "exact" ? HessianKind::exact : HessianKind::gauss_newton;
+}
+
+void readMaterial(Texts &texts, Options *o) {
   for (const Key *key : rodOverrides())
     if (const std::string name(key->name()); texts.isGiven("-rod_" + name)) {
       const std::string text = texts.given("-rod_" + name);
@@ -265,6 +267,32 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
           key->type == KeyType::pair && text.find(',') != std::string::npos && text[0] != '['; // as vectors are written
       o->overrides[name] = bare ? "[" + text + "]" : text;
     }
+}
+
+} // namespace
+
+PetscErrorCode readOptions(int argc, char **argv, Options *o) {
+  PetscBool set;
+  PetscFunctionBeginUser;
+  for (int i = 1; i < argc; ++i)
+    if (!isOptionName(argv[i]) && (i == 1 || !isOptionName(argv[i - 1])))
+      throw SceneError(std::string("command line: '") + argv[i] +
+                       "' belongs to no option; options begin with - and take one value (lists without blanks)");
+  Texts texts;
+  PetscCall(texts.read());
+  PetscCall(PetscOptionsHasName(nullptr, nullptr, "-help", &set));
+  o->help = set;
+  o->schema = texts.flag("-schema");
+  o->keys = texts.flag("-keys");
+  o->scene = texts.text("-scene");
+  readTime(texts, o);
+  readStatics(texts, o);
+  if (texts.has("-gravity")) o->gravity = texts.vector("-gravity");
+  o->rod_edges = readRodEdges(texts.text("-rod_edges"));
+  readOutput(texts, o);
+  readAccuracy(texts, o);
+  readSolver(texts, o);
+  readMaterial(texts, o);
   PetscCall(refuseUnsuited());
   texts.number("-snes_rtol"); // PETSc reads them, with less to say about mistakes
   texts.integer("-snes_max_it");

@@ -8,6 +8,8 @@
 
 namespace tendril {
 
+constexpr int most_trials = 40; // of lengths in a line search
+
 const IncrementalPotential::RodEnergy &NewtonSolver::energyAtIterate(int r) {
   if (!work_->energy_known[r]) work_->energy[r] = potential_->rodEnergy(potential_->iterate(), r);
   work_->energy_known[r] = true;
@@ -29,100 +31,115 @@ bool NewtonSolver::residualFalls(int r, double length, const IncrementalPotentia
          (size(now) <= (1 - sufficient * length) * size(before) || excess(now, rtol_) <= 1 || isAtNoise(now, rtol_));
 }
 
-/// Moves one rod along its increment; false when no length of the step lowers its energy enough.
-bool NewtonSolver::searchRod(int r, double *lambda) {
+/// Trial of one rod at a length of its increment, and its energy.
+IncrementalPotential::RodEnergy NewtonSolver::tryLength(int r, double length) {
+  ++report_.trials;
+  (void)PetscLogEventBegin(events().configuration, 0, 0, 0, 0);
+  const bool possible = potential_->tryMove(work_->increment, length, r, work_->trial);
+  (void)PetscLogEventEnd(events().configuration, 0, 0, 0, 0);
+  (void)PetscLogEventBegin(events().energy, 0, 0, 0, 0);
+  const IncrementalPotential::RodEnergy energy =
+      possible ? potential_->rodEnergy(work_->trial, r) : IncrementalPotential::RodEnergy{};
+  (void)PetscLogEventEnd(events().energy, 0, 0, 0, 0);
+  return energy;
+}
+
+/// Whether the trial of a rod at a length is good. Wolfe's conditions take two trials more.
+NewtonSolver::Length NewtonSolver::judgeLength(int r, double length, const Descent &d,
+                                               const IncrementalPotential::RodEnergy &there) {
   constexpr double sufficient = 1e-4;
-  constexpr int most_trials = 40;
-  const RodRange &rod = potential_->elements().rods[r];
-  double slope = -dot(rod, potential_->gradient(r).gradient, work_->increment);
-  if (!std::isfinite(slope)) return false;
-  for (int a = 0; a < slot_size; ++a)
-    for (int s = rod.first_slot; s < rod.vertexEnd() + (rod.closed ? 2 : 0); s += lanes) {
-      const Pack d = read<Pack>(work_->increment[a] + s);
-      write(work_->increment[a] + s, work_->moving[r] ? Pack(read<Pack>(work_->motion[a] + s) - d) : Pack(-d));
-    }
-  const IncrementalPotential::RodEnergy before = energyAtIterate(r);
-  IncrementalPotential::RodEnergy after;
-  Standstill &standstill = work_->standstill[r];
-  standstill.known = fresh_ && !work_->indefinite[r] && !work_->moving[r];
-  standstill.partial = work_->zero[r] > 0;
-  standstill.energy = slope;
-  auto attempt = [&](double length) {
-    ++report_.trials;
-    (void)PetscLogEventBegin(events().configuration, 0, 0, 0, 0);
-    const bool possible = potential_->tryMove(work_->increment, length, r, work_->trial);
-    (void)PetscLogEventEnd(events().configuration, 0, 0, 0, 0);
-    (void)PetscLogEventBegin(events().energy, 0, 0, 0, 0);
-    const IncrementalPotential::RodEnergy energy =
-        possible ? potential_->rodEnergy(work_->trial, r) : IncrementalPotential::RodEnergy{};
-    (void)PetscLogEventEnd(events().energy, 0, 0, 0, 0);
-    return energy;
-  };
-  // Where the symmetric part is indefinite, couples have nothing that an equilibrium would minimise.
-  const bool free = seek_ == Seek::equilibrium ||
-                    (potential_->step().isStatic() && circulatory_ && circulatory_->acts(r) && work_->negative[r] > 0);
+  if (!std::isfinite(there.value)) return Length::too_long;
+  // Supports that move do work: the energy may rise with them, and only has to be finite.
+  if (work_->moving[r] || d.free) return Length::good;
   const LineSearchKind kind = potential_->settings.line_search;
-  enum class Length { good, too_long, too_short };
-  auto judge = [&](double length) {
-    if (!std::isfinite(after.value)) return Length::too_long;
-    // Supports that move do work: the energy may rise with them, and only has to be finite.
-    if (work_->moving[r] || free) return Length::good;
-    if (kind == LineSearchKind::residual) return residualFalls(r, length, after) ? Length::good : Length::too_long;
-    if (!(after.value <= before.value + sufficient * length * slope + before.noise)) return Length::too_long;
-    constexpr double apart = 1e-3, flat = 0.9;
-    if (kind != LineSearchKind::wolfe || -slope * length * apart < 10 * before.noise) return Length::good;
-    const double beyond = attempt(length * (1 + apart)).value, ahead = attempt(length * (1 - apart)).value;
-    attempt(length); // is the trial again
-    const double there = (beyond - ahead) / (2 * apart * length);
-    return there < flat * slope ? Length::too_short : there > -flat * slope ? Length::too_long : Length::good;
-  };
-  *lambda = 1;
-  bool accepted = false;
+  if (kind == LineSearchKind::residual) return residualFalls(r, length, there) ? Length::good : Length::too_long;
+  if (!(there.value <= d.before.value + sufficient * length * d.slope + d.before.noise)) return Length::too_long;
+  constexpr double apart = 1e-3, flat = 0.9;
+  if (kind != LineSearchKind::wolfe || -d.slope * length * apart < 10 * d.before.noise) return Length::good;
+  const double beyond = tryLength(r, length * (1 + apart)).value, ahead = tryLength(r, length * (1 - apart)).value;
+  tryLength(r, length); // is the trial again
+  const double slope = (beyond - ahead) / (2 * apart * length);
+  return slope < flat * d.slope ? Length::too_short : slope > -flat * d.slope ? Length::too_long : Length::good;
+}
+
+/// A length that is good; false where none is found. The trial is there, then.
+bool NewtonSolver::findLength(int r, const Descent &d, double *lambda, IncrementalPotential::RodEnergy *there) {
   double low = 0, high = HUGE_VAL;
-  for (int trial = 0; trial < most_trials && !accepted; ++trial) {
-    after = attempt(*lambda);
-    const Length length = judge(*lambda);
-    accepted = length == Length::good;
-    if (accepted) break;
+  *lambda = 1;
+  for (int trial = 0; trial < most_trials; ++trial) {
+    *there = tryLength(r, *lambda);
+    const Length length = judgeLength(r, *lambda, d, *there);
+    if (length == Length::good) return true;
     (length == Length::too_short ? low : high) = *lambda;
-    if (kind == LineSearchKind::wolfe && std::isfinite(after.value)) {
+    if (potential_->settings.line_search == LineSearchKind::wolfe && std::isfinite(there->value)) {
       *lambda = std::isfinite(high) ? 0.5 * (low + high) : 2 * *lambda;
       continue;
     }
     // Minimum of the parabola through both energies and the slope, kept within a fifth and a half.
-    const double curvature = after.value - before.value - *lambda * slope;
+    const double curvature = there->value - d.before.value - *lambda * d.slope;
     const double best =
-        std::isfinite(after.value) && curvature > 0 ? -slope * *lambda * *lambda / (2 * curvature) : 0.5 * *lambda;
+        std::isfinite(there->value) && curvature > 0 ? -d.slope * *lambda * *lambda / (2 * curvature) : 0.5 * *lambda;
     *lambda = std::clamp(best, 0.2 * *lambda, 0.5 * *lambda);
   }
-  if (!accepted) {
-    double size;
-    *lambda = 0; // where the rod stays
-    if (excess(work_->residual[r], rtol_) <= 1) return true;
-    if (!fresh_) return renew_ = true;
-    if (!standstill.known) return false;
-    if (!isLittle(r, &size) && !isNeutral(r)) {
-      if (isAtNoise(work_->residual[r], 0)) lost_ = roundingMessage(r, size);
-      return false;
-    }
-    standstill.iterations = most_trials; // what energies can tell is spent
-    return true;
+  return false;
+}
+
+/// What a rod does for which no length is good; false where that is a failure.
+bool NewtonSolver::standStill(int r, double *lambda) {
+  Standstill &standstill = work_->standstill[r];
+  double size;
+  *lambda = 0; // where the rod stays
+  if (excess(work_->residual[r], rtol_) <= 1) return true;
+  if (!fresh_) return renew_ = true;
+  if (!standstill.known) return false;
+  if (!isLittle(r, &size) && !isNeutral(r)) {
+    if (isAtNoise(work_->residual[r], 0)) lost_ = roundingMessage(r, size);
+    return false;
   }
+  standstill.iterations = most_trials; // what energies can tell is spent
+  return true;
+}
+
+/// A full step that gained clearly more than a quadratic would: the minimum lies beyond, as on the way down from a
+/// barrier.
+void NewtonSolver::goBeyond(int r, const Descent &d, double *lambda, IncrementalPotential::RodEnergy *there) {
+  const double gain = (there->value - d.before.value) / d.slope;
+  if (potential_->settings.line_search != LineSearchKind::energy || d.free || *lambda != 1 ||
+      !(gain > 0.6 && gain < 1) || !(-d.slope > 1e3 * d.before.noise))
+    return;
+  const double longer = std::min(2.0, 0.5 / (1 - gain));
+  const IncrementalPotential::RodEnergy beyond = tryLength(r, longer);
+  if (beyond.value < there->value) {
+    *there = beyond;
+    *lambda = longer;
+  } else
+    potential_->tryMove(work_->increment, 1, r, work_->trial);
+}
+
+/// Moves one rod along its increment; false when no length of the step lowers its energy enough.
+bool NewtonSolver::searchRod(int r, double *lambda) {
+  const RodRange &rod = potential_->elements().rods[r];
+  Descent d;
+  d.slope = -dot(rod, potential_->gradient(r).gradient, work_->increment);
+  if (!std::isfinite(d.slope)) return false;
+  for (int a = 0; a < slot_size; ++a)
+    for (int s = rod.first_slot; s < rod.vertexEnd() + (rod.closed ? 2 : 0); s += lanes) {
+      const Pack step = read<Pack>(work_->increment[a] + s);
+      write(work_->increment[a] + s, work_->moving[r] ? Pack(read<Pack>(work_->motion[a] + s) - step) : Pack(-step));
+    }
+  d.before = energyAtIterate(r);
+  // Where the symmetric part is indefinite, couples have nothing that an equilibrium would minimise.
+  d.free = seek_ == Seek::equilibrium ||
+           (potential_->step().isStatic() && circulatory_ && circulatory_->acts(r) && work_->negative[r] > 0);
+  Standstill &standstill = work_->standstill[r];
+  standstill.known = fresh_ && !work_->indefinite[r] && !work_->moving[r];
+  standstill.partial = work_->zero[r] > 0;
+  standstill.energy = d.slope;
+  IncrementalPotential::RodEnergy after;
+  if (!findLength(r, d, lambda, &after)) return standStill(r, lambda);
   standstill.tiny = work_->indefinite[r] && *lambda >= 1 && sizeOf(r, work_->increment) < 1e-3;
   if (*lambda < 0.1) work_->last_shift[r] *= 16; // a shift that leaves too long a step is too small
-  // A full step that gained clearly more than a quadratic would: the minimum lies beyond, as on the way down from a
-  // barrier.
-  const double gain = (after.value - before.value) / slope;
-  if (kind == LineSearchKind::energy && !free && *lambda == 1 && gain > 0.6 && gain < 1 &&
-      -slope > 1e3 * before.noise) {
-    const double longer = std::min(2.0, 0.5 / (1 - gain));
-    const IncrementalPotential::RodEnergy beyond = attempt(longer);
-    if (beyond.value < after.value) {
-      after = beyond;
-      *lambda = longer;
-    } else
-      potential_->tryMove(work_->increment, 1, r, work_->trial);
-  }
+  goBeyond(r, d, lambda, &after);
   potential_->accept(work_->trial, r);
   work_->energy[r] = after;
   work_->energy_known[r] = potential_->scene().moments.empty(); // the work of couples is counted from the iterate

@@ -89,12 +89,10 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
   return updateFrames(from, increment, scale, r, to);
 }
 
-/// Replaces the additive positions of a rod: chains where an end is free, corrections between held vertices and around
-/// rings.
-[[gnu::flatten]] bool Retraction::restoreLengths(const C &from, int r, RetractionKind kind, C &to) {
+/// Lengths that edges shall have, and their directions, by the additive positions in `to`; false when an edge vanishes
+/// or turns back on itself.
+[[gnu::flatten]] bool Retraction::aim(const C &from, const RodRange &rod, RetractionKind kind, const C &to) {
   using std::sqrt;
-  const RodRange &rod = elements_.rods[r];
-  double *wanted = work_[target];
   for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
     const Vector3<Pack> edge = to.edges<Pack>(s); // e + scale de
     const FrameOf<Pack> before = from.frames<Pack>(s);
@@ -104,74 +102,95 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
     if (kind == RetractionKind::kept) want = before.length;
     const Pack length = sqrt(edge.squaredNorm());
     if (any_of(!(want > Pack(0.0) && length > Pack(0.0)) && firstLanes(rod.edgeEnd() - s))) return false;
-    write(wanted + s, want);
+    write(work_[target] + s, want);
     writeVector<Pack>(work_, direction, s, edge / length);
   }
-  std::array<double *, 3> x, low, d;
+  return true;
+}
+
+/// Lays the edges of a chain one after the other, from the vertex at the slot `begin` to that at `end`.
+void Retraction::lay(int begin, int end, C &to) const {
+  const int way = end > begin ? 1 : -1;
+  std::array<double *, 3> x, low;
+  std::array<const double *, 3> d;
   for (int a = 0; a < 3; ++a) {
     x[a] = to[C::Plane(C::position + a)];
     low[a] = to[C::Plane(C::position_low + a)];
     d[a] = work_[direction + a];
   }
-  if (rod.closed) {
-    projectSpan(rod, rod.first_slot, rod.edgeEnd(), to);
-    return true;
-  }
-  auto step = [&](int at, int edge, int next, double sign) {
+  for (int at = begin; at != end; at += way) {
+    const int edge = way > 0 ? at : at - 1, next = at + way;
     for (int a = 0; a < 3; ++a) { // as addTwoWords, but the words are put in order later, off the chain of dependencies
-      const double e = sign * wanted[edge] * d[a][edge], sum = x[a][at] + e, added = sum - x[a][at];
+      const double e = way * work_[target][edge] * d[a][edge], sum = x[a][at] + e, added = sum - x[a][at];
       low[a][next] = low[a][at] + ((x[a][at] - (sum - added)) + (e - added));
       x[a][next] = sum;
     }
+  }
+}
+
+/// Moves all of a rod, and puts the two words of its positions in order.
+static void moveAll(const RodRange &rod, const Vec3 &by, C &to) {
+  for (int a = 0; a < 3; ++a) {
+    double *x = to[C::Plane(C::position + a)], *low = to[C::Plane(C::position_low + a)];
+    for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) {
+      Pack high = read<Pack>(x + s), rest = read<Pack>(low + s);
+      addTwoWords(high, rest, Pack(by[a]));
+      write(x + s, high);
+      write(low + s, rest);
+    }
+  }
+}
+
+/// A free rod keeps the mass-weighted mean of the additive update.
+[[gnu::flatten]] void Retraction::layFree(const C &from, const RodRange &rod, C &to) const {
+  const double *mass = elements_.mass();
+  Vec3 before = Vec3::Zero(), after = Vec3::Zero();
+  double total = 0;
+  auto mean = [&](Vec3 &sum) {
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) sum += mass[s] * to.displacementAt(s, from);
   };
-  auto moveAll = [&](const Vec3 &by) {
-    for (int a = 0; a < 3; ++a)
-      for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) {
-        Pack high = read<Pack>(x[a] + s), rest = read<Pack>(low[a] + s);
-        addTwoWords(high, rest, Pack(by[a]));
-        write(x[a] + s, high);
-        write(low[a] + s, rest);
-      }
-  };
+  mean(before);
+  lay(rod.first_slot, rod.edgeEnd(), to);
+  mean(after);
+  for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) total += mass[s];
+  moveAll(rod, total > 0 ? Vec3((before - after) / total) : Vec3::Zero(), to);
+}
+
+/// Replaces the additive positions of a rod: chains where an end is free, corrections between held vertices and around
+/// rings.
+[[gnu::flatten]] bool Retraction::restoreLengths(const C &from, int r, RetractionKind kind, C &to) {
+  const RodRange &rod = elements_.rods[r];
+  if (!aim(from, rod, kind, to)) return false;
+  const int begin = rod.first_slot, end = rod.edgeEnd(); // end vertices of an open rod
   const double *freedom = elements_.freedom();
   int first = -1, last = -1; // held vertices of the rod
-  for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
+  for (int s = begin; s < rod.vertexEnd(); ++s)
     if (freedom[s] == 0) {
       if (first < 0) first = s;
       last = s;
     }
   const Elements::Pins &pins = elements_.pinsOf(r);
-  if (first < 0 && !pins.empty()) {
-    projectSpan(rod, rod.first_slot, rod.edgeEnd(), to);
+  if (rod.closed || (first < 0 && !pins.empty())) {
+    projectSpan(rod, begin, end, to);
     return true;
   }
-  if (first < 0) { // a free rod keeps the mass-weighted mean of the additive update
-    const double *mass = elements_.mass();
-    Vec3 before = Vec3::Zero(), after = Vec3::Zero();
-    double total = 0;
-    auto mean = [&](Vec3 &sum) {
-      for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) sum += mass[s] * to.displacementAt(s, from);
-    };
-    mean(before);
-    for (int s = rod.first_slot; s < rod.edgeEnd(); ++s) step(s, s, s + 1, 1);
-    mean(after);
-    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) total += mass[s];
-    moveAll(total > 0 ? Vec3((before - after) / total) : Vec3::Zero());
+  if (first < 0) {
+    layFree(from, rod, to);
     return true;
   }
   // Ends that hang from the first and the last of them, by chains; with pins they are spans, too.
   const bool first_hangs = pins.empty() || pins.front().first > first,
              last_hangs = pins.empty() || pins.back().first < last;
-  for (int s = first; first_hangs && s > rod.first_slot; --s) step(s, s - 1, s - 1, -1);
-  for (int s = last; last_hangs && s + 1 < rod.vertexEnd(); ++s) step(s, s, s + 1, 1);
-  moveAll(Vec3::Zero());
-  if (!first_hangs) projectSpan(rod, rod.first_slot, first, to);
-  if (!last_hangs) projectSpan(rod, last, rod.edgeEnd(), to);
+  if (first_hangs) lay(first, begin, to);
+  if (last_hangs) lay(last, end, to);
+  moveAll(rod, Vec3::Zero(), to);
+  if (!first_hangs) projectSpan(rod, begin, first, to);
+  if (!last_hangs) projectSpan(rod, last, end, to);
   for (int s = first; s < last;) {
-    int end = s + 1;
-    while (freedom[end] != 0) ++end;
-    if (end > s + 1) projectSpan(rod, s, end, to);
-    s = end;
+    int next = s + 1;
+    while (freedom[next] != 0) ++next;
+    if (next > s + 1) projectSpan(rod, s, next, to);
+    s = next;
   }
   return true;
 }

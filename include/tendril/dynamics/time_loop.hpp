@@ -96,6 +96,7 @@ private:
     bool too_coarse = false; ///< for the error asked for
     void commit(const IncrementalPotential &potential, RodSet rods, State *next);
   };
+  void prepare(const State &state);
   PetscErrorCode attempt(const State &state, State *next, Attempt *now);
   bool mayPassCritical(const State &state, const NewtonReport &report) const;
   void accept(State &state, State &next, Attempt *now, Work *work);

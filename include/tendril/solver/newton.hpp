@@ -184,6 +184,18 @@ private:
   double firstShift(int rod) const;
   PetscErrorCode includeMotion(Vec y);
   PetscErrorCode includeCirculation(bool *regular);
+  /// What a line search goes by.
+  struct Descent {
+    double slope = 0;                       ///< of the energy, by the length [J]
+    IncrementalPotential::RodEnergy before; ///< at the iterate
+    bool free = false;                      ///< whether the energy may rise
+  };
+  enum class Length { good, too_long, too_short };
+  IncrementalPotential::RodEnergy tryLength(int rod, double length);
+  Length judgeLength(int rod, double length, const Descent &descent, const IncrementalPotential::RodEnergy &there);
+  bool findLength(int rod, const Descent &descent, double *lambda, IncrementalPotential::RodEnergy *there);
+  bool standStill(int rod, double *lambda);
+  void goBeyond(int rod, const Descent &descent, double *lambda, IncrementalPotential::RodEnergy *there);
   bool searchRod(int rod, double *lambda);
   bool residualFalls(int rod, double length, const IncrementalPotential::RodEnergy &trial);
   bool sharesFactor() const;
