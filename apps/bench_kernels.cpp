@@ -115,7 +115,7 @@ template <class T> Cell<T> cellOf(int first) {
   out.f0.length = copy([](const Cell<double> &c) { return c.f0.length; });
   out.f1.length = copy([](const Cell<double> &c) { return c.f1.length; });
   out.constants.base = copy([](const Cell<double> &c) { return c.constants.base; });
-  out.constants.turns = T(0.0);
+  out.constants.winding = T(0.0);
   out.constants.sign = T(1.0);
   return out;
 }

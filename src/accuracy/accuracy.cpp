@@ -88,13 +88,13 @@ PetscErrorCode estimateAt(const Scene &scene, const std::vector<Drawing> &drawin
   for (int &n : twice) n *= 2;
   Simulation run;
   Answer answer;
-  PetscCall(solveStatics(run, redraw(scene, drawings, edges), settings, &answer));
+  PetscCall(solveStatics(run, remesh(scene, drawings, edges), settings, &answer));
   if (!answer.found) {
     round->none = answer.failure;
     PetscFunctionReturn(0);
   }
   Estimate e;
-  PetscCall(estimateError(run, answer.rounding_error, {}, redraw(scene, drawings, twice), settings, &e));
+  PetscCall(estimateError(run, answer.rounding_error, {}, remesh(scene, drawings, twice), settings, &e));
   round->none = e.none;
   if (!e.none.empty()) PetscFunctionReturn(0);
   for (const RodEstimate &r : e.rods)

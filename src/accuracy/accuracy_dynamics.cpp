@@ -153,7 +153,7 @@ private:
             << scene_.rods[0].name << "' and " << stepText(resolution.steps);
       });
       if (!adapts_ && s.dt_min == 0) s.dt_min = s.dt / 16; // where shorter ones are needed, all should be
-      PetscCall(sample(redraw(scene_, drawings_, resolution.edges), s, times_, &place->second));
+      PetscCall(sample(remesh(scene_, drawings_, resolution.edges), s, times_, &place->second));
       count(place->second);
       if (!place->second.failure.empty())
         failure_ = "with " + stepText(resolution.steps) + ", " + place->second.failure;
@@ -226,7 +226,7 @@ private:
       s.dt = 1e-3 * s.t_end;
       s.dt_min = 1e-5 * s.t_end;
       s.dt_max = s.output_interval = 0;
-      PetscCall(sample(redraw(scene_, drawings_, base.edges), s, {times_[0]}, &start_));
+      PetscCall(sample(remesh(scene_, drawings_, base.edges), s, {times_[0]}, &start_));
       count(start_);
     }
     *resolved = true;

@@ -1,6 +1,6 @@
 #include "tendril/dynamics/prolong.hpp"
 
-#include "tendril/model/redraw.hpp"
+#include "tendril/model/remesh.hpp"
 
 #include <algorithm>
 
@@ -43,7 +43,7 @@ void setTurns(const std::vector<TwistRates> &rates, const Scene &fine, const Ele
       const double rate = j >= 0       ? (j % 2 == 0 ? middle(j / 2) : after[j / 2])
                           : k % 2 == 0 ? before[k / 2]
                                        : middle(k / 2);
-      state.turns[elements.rod_cells[r] + n] =
+      state.winding[elements.rod_cells[r] + n] =
           2 * pi * std::round((rate * elements.cellLength()[slot] - c[Configuration::twist][slot]) / (2 * pi));
     }
   }
@@ -92,7 +92,7 @@ State prolonged(const State &state, const Scene &scene, const Elements &elements
   out.position_low.assign(out.position.size(), Vec3::Zero());
   out.velocity.assign(out.position.size(), Vec3::Zero());
   out.twist_rate.assign(out.director.size(), 0.0);
-  out.turns.assign(fine_elements.cell_slot.size(), 0.0);
+  out.winding.assign(fine_elements.cell_slot.size(), 0.0);
   setTurns(rates, fine, fine_elements, out);
   return out;
 }

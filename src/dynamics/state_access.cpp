@@ -105,7 +105,7 @@ std::vector<double> RodAccess::cellTwists(const State &state) const {
   std::vector<double> twists;
   for (std::size_t n = 0; n < cells_.size(); ++n)
     twists.push_back(halfAngleBetween(frameAt(state, cells_[n].frame0), frameAt(state, cells_[n].frame1)).angle() +
-                     state.turns[elements_.rod_cells[index_] + n]);
+                     state.winding[elements_.rod_cells[index_] + n]);
   return twists;
 }
 
@@ -138,7 +138,7 @@ void RodAccess::setTurns(State &next, std::vector<double> twists, const std::vec
     turns[n] = 2 * pi * std::round((expected - principal) / (2 * pi));
   }
   if (rod().measure == Measure::angle)
-    std::copy(turns.begin(), turns.end(), next.turns.begin() + elements_.rod_cells[index_]);
+    std::copy(turns.begin(), turns.end(), next.winding.begin() + elements_.rod_cells[index_]);
 }
 
 void RodAccess::accept(State &&next) {
@@ -280,7 +280,7 @@ void RodAccess::reset() {
   copy(initial.director, next.director, range_.first_edge, range_.edges);
   copy(initial.twist_rate, next.twist_rate, range_.first_edge, range_.edges);
   copy(initial.axial_force, next.axial_force, range_.first_edge, range_.edges);
-  copy(initial.turns, next.turns, elements_.rod_cells[index_], int(cells_.size()));
+  copy(initial.winding, next.winding, elements_.rod_cells[index_], int(cells_.size()));
   accept(std::move(next));
 }
 

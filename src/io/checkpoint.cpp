@@ -85,7 +85,7 @@ template <class Archive, class AnyContents> void exchange(Archive &a, AnyContent
   a.array("velocity", s.velocity, elements.vertices());
   a.array("twist_rate", s.twist_rate, elements.edges());
   a.array("axial_force", s.axial_force, elements.edges());
-  a.array("turns", s.turns, cells);
+  a.array("turns", s.winding, cells);
   a.array("cell_place", c.cells, cells);
   a.array("cell_twist", c.twists, twists);
   if constexpr (Archive::reads) s.memory.resize(memory);
@@ -103,7 +103,7 @@ template <class Archive, class AnyContents> void exchange(Archive &a, AnyContent
 /// Whole turns of cells that were others in the checkpoint: the twist of a vertex along the rod stays what it was, by
 /// whole cell or halves.
 void carryTurns(const Simulation &run, const Contents &old, const std::vector<double> &places, State *state) {
-  state->turns.assign(places.size(), 0.0);
+  state->winding.assign(places.size(), 0.0);
   if (!countsTurns(*run.elements) || old.twists.size() != old.cells.size()) return;
   std::map<double, double> twist;
   for (std::size_t n = 0; n < old.cells.size(); ++n) twist[old.cells[n]] = old.twists[n];
@@ -116,7 +116,7 @@ void carryTurns(const Simulation &run, const Contents &old, const std::vector<do
         expected = same->second;
       else if (std::fmod(places[n], 4) == 0 && twist.count(places[n] + 1) && twist.count(places[n] + 2))
         expected = twist[places[n] + 1] + twist[places[n] + 2];
-      state->turns[n] = 2 * pi * std::round((expected - principal[n]) / (2 * pi));
+      state->winding[n] = 2 * pi * std::round((expected - principal[n]) / (2 * pi));
     }
   }
 }
@@ -126,8 +126,8 @@ void carryTurns(const Simulation &run, const Contents &old, const std::vector<do
 void beginAnew(const Simulation &run, State *state, std::vector<std::string> *told) {
   for (std::size_t r = 0; r < run.elements->rods.size(); ++r) {
     if (run.elements->measure[r] == Measure::angle) continue;
-    const auto begin = state->turns.begin() + run.elements->rod_cells[r],
-               end = state->turns.begin() + run.elements->rod_cells[r + 1];
+    const auto begin = state->winding.begin() + run.elements->rod_cells[r],
+               end = state->winding.begin() + run.elements->rod_cells[r + 1];
     if (std::all_of(begin, end, [](double turns) { return turns == 0; })) continue;
     std::fill(begin, end, 0.0);
     told->push_back("warning: rod '" + inOneLine(run.scene.rods[r].name) +
@@ -191,7 +191,7 @@ void readArrays1(const std::string &path, const Hdf5File &file, const Elements &
   array("velocity", s.velocity, elements.vertices());
   array("twist_rate", s.twist_rate, elements.edges());
   array("axial_force", s.axial_force, elements.edges());
-  array("turns", s.turns, elements.cell_slot.size());
+  array("turns", s.winding, elements.cell_slot.size());
   std::vector<double> loop = file.read("loop", 1);
   if (loop.size() != 10 && loop.size() != 11) throw DamagedCheckpoint(path + ": 'loop' is not that of a checkpoint");
   s.time = loop[0];
@@ -318,7 +318,7 @@ bool readCheckpoint(const std::string &path, Simulation *run, StepControl *contr
     throw DamagedCheckpoint(path + ": its time or step is no number");
   State &s = c.state;
   const bool other_cells = !c.cells.empty() && c.cells != places;
-  if (c.cells.empty() && s.turns.size() != places.size()) s.turns.assign(places.size(), 0.0);
+  if (c.cells.empty() && s.winding.size() != places.size()) s.winding.assign(places.size(), 0.0);
   if (!same_method) {
     s.memory.clear();
     s.strains.clear();

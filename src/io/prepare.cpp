@@ -32,10 +32,10 @@ PetscErrorCode makeReady(Scene scene, const Options &o, std::unique_ptr<Simulati
   PetscFunctionReturn(0);
 }
 
-void redrawAsAsked(SceneFile &file, const Options &o) {
+void remeshAsAsked(SceneFile &file, const Options &o) {
   const std::vector<int> edges = edgesAsked(file.scene, o);
   try {
-    file.scene = redraw(file.scene, file.drawings, edges);
+    file.scene = remesh(file.scene, file.drawings, edges);
   } catch (const SceneError &e) {
     throw SceneError(std::string("option -rod_edges: ") + e.what());
   }
@@ -68,7 +68,7 @@ PetscErrorCode prepare(Prepared &prepared, Options &o) {
     prepared.drawings = file.drawings;
     if (o.accuracy) grade(prepared.written, prepared.drawings);
   }
-  if (!o.rod_edges.empty()) redrawAsAsked(file, o);
+  if (!o.rod_edges.empty()) remeshAsAsked(file, o);
   PetscCall(makeReady(std::move(file.scene), o, prepared.run));
   PetscCall(PetscLogStagePop());
   PetscFunctionReturn(0);
@@ -86,7 +86,7 @@ PetscErrorCode meetAccuracy(Prepared &prepared, Options &o, Choice *choice) {
   };
   PetscCall(chooseResolution(prepared.written, prepared.drawings, o.loop, *o.accuracy, choice));
   o.loop = choice->loop;
-  PetscCall(makeReady(redraw(prepared.written, prepared.drawings, choice->edges), o, prepared.run));
+  PetscCall(makeReady(remesh(prepared.written, prepared.drawings, choice->edges), o, prepared.run));
   PetscFunctionReturn(0);
 }
 

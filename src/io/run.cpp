@@ -54,7 +54,7 @@ PetscErrorCode tellError(const Prepared &prepared, double rounding_error, const 
   const Simulation &run = *prepared.run;
   Estimate estimate;
   PetscCall(estimateError(run, rounding_error, critical,
-                          redraw(prepared.written, prepared.drawings, edgesOf(run.scene, 2)), o.loop, &estimate));
+                          remesh(prepared.written, prepared.drawings, edgesOf(run.scene, 2)), o.loop, &estimate));
   for (const std::string &line : describe(estimate, run.scene)) progress.say(line);
   writeEstimate(o.output_dir + "/trajectory.h5", estimate);
   PetscFunctionReturn(0);

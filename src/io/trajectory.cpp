@@ -40,7 +40,7 @@ const Field fields[] = {
     {"twist_rate", "rad/s", On::edges, 1, From::state, [](const Snapshot &s) { return s.state.twist_rate.data(); }},
     {"axial_force", "N", On::edges, 1, From::state, [](const Snapshot &s) { return s.state.axial_force.data(); }},
     // Measure `angle`: 2 pi x whole turns of each cell's twist [rad].
-    {"turns", "rad", On::cells, 1, From::state, [](const Snapshot &s) { return s.state.turns.data(); }},
+    {"turns", "rad", On::cells, 1, From::state, [](const Snapshot &s) { return s.state.winding.data(); }},
     {"position_low", "m", On::vertices, 3, From::second_word,
      [](const Snapshot &s) { return s.state.position_low[0].data(); }},
     {"curvature", "1/m", On::vertices, 2, From::strains,

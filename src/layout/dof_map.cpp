@@ -219,14 +219,14 @@ void DofMap::fold(const RodRange &rod, Planes &sums) const {
     }
 }
 
-PetscErrorCode DofMap::gather(const Planes &values, RodSet rods, Vec out, const std::vector<char> *wanted) const {
+PetscErrorCode DofMap::gather(const Planes &values, RodSet rods, Vec out, const std::vector<char> *active) const {
   PetscScalar *begin;
   PetscFunctionBeginUser;
   PetscCall(VecGetArrayWrite(out, &begin));
   PetscScalar *to = begin;
   for (int r = rods.begin; r < rods.end; ++r) {
     const RodRange &rod = rods_[r];
-    if (wanted && !(*wanted)[r]) {
+    if (active && !(*active)[r]) {
       to = std::fill_n(to, unknown_begin_[r + 1] - unknown_begin_[r], 0.0);
       continue;
     }

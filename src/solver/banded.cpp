@@ -57,9 +57,9 @@ bool BandedFactor::sameShape(int a, int b) const {
          held_[a - rods_.begin] == held_[b - rods_.begin];
 }
 
-/// Groups of the wanted rods of each shape: whole packs; of the rest, a pack when that is cheaper than one after the
+/// Groups of the active rods of each shape: whole packs; of the rest, a pack when that is cheaper than one after the
 /// other. Returns how many numbers their factors take.
-std::size_t BandedFactor::plan(const char *wanted) {
+std::size_t BandedFactor::plan(const char *active) {
   constexpr int worth_a_pack = 3;
   groups_.clear();
   std::size_t size = 0;
@@ -86,7 +86,7 @@ std::size_t BandedFactor::plan(const char *wanted) {
     open.count = 0;
   };
   for (const int r : order_) {
-    if (wanted && !wanted[r]) continue;
+    if (active && !active[r]) continue;
     if (open.count == lanes || (open.count > 0 && !sameShape(open.rod[0], r))) flush();
     open.rod[open.count++] = r;
   }
@@ -95,7 +95,7 @@ std::size_t BandedFactor::plan(const char *wanted) {
 }
 
 void BandedFactor::factor(const BandedSystem &system) {
-  plan(system.wanted->data());
+  plan(system.active->data());
   for (const Group &group : groups_)
     if (group.packed)
       factorGroup<Pack>(group, system);

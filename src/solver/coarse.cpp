@@ -1,6 +1,6 @@
 #include "tendril/solver/coarse.hpp"
 
-#include "tendril/model/redraw.hpp"
+#include "tendril/model/remesh.hpp"
 #include "tendril/solver/activity.hpp"
 #include "tendril/solver/step_solver.hpp"
 
@@ -139,7 +139,7 @@ struct Coarse {
     }
     state.velocity.assign(state.position.size(), Vec3::Zero());
     state.twist_rate.assign(state.director.size(), 0.0);
-    state.turns.assign(elements.cell_slot.size(), 0.0);
+    state.winding.assign(elements.cell_slot.size(), 0.0);
     return state;
   }
 

@@ -21,7 +21,7 @@ PetscErrorCode NewtonSolver::readInertia(bool *regular) {
   PetscCall(PCFactorGetMatrix(pc, &factor));
   if (const BandedFactor *banded = bandedFactorOf(factor)) {
     for (int r = rods_.begin; r < rods_.end; ++r) {
-      if (!work_->wanted[r]) continue;
+      if (!work_->active[r]) continue;
       report_.negative_pivots += work_->negative[r] = banded->negativePivots(r);
       report_.zero_pivots += work_->zero[r] = banded->zeroPivots(r);
     }
@@ -91,8 +91,8 @@ PetscErrorCode NewtonSolver::findIndefinite(Vec y, bool regular, bool *any) {
   *any = false;
   for (int r = rods_.begin; r < rods_.end; ++r) {
     char &indefinite = work_->indefinite[r];
-    indefinite = work_->wanted[r] && (work_->negative[r] > 0 || !regular);
-    if (work_->wanted[r] && !indefinite && work_->zero[r] > 0 && !isAtNoise(work_->residual[r], 0)) {
+    indefinite = work_->active[r] && (work_->negative[r] > 0 || !regular);
+    if (work_->active[r] && !indefinite && work_->zero[r] > 0 && !isAtNoise(work_->residual[r], 0)) {
       if (!scattered) PetscCall(potential_->dofs().scatter(y, rods_, work_->increment));
       scattered = true;
       const RodRange &rod = potential_->elements().rods[r];
@@ -137,7 +137,7 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
       potential_->step().hessian == HessianKind::exact ? HessianKind::uncompressed : potential_->step().hessian;
   bool compressed = false;
   for (int r = rods_.begin; r < rods_.end; ++r) {
-    if (!work_->wanted[r] || !work_->indefinite[r] || work_->negative[r] <= few) continue;
+    if (!work_->active[r] || !work_->indefinite[r] || work_->negative[r] <= few) continue;
     potential_->assembleRod(r, kind);
     compressed = true;
   }
@@ -154,7 +154,7 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
     longer = false;
     PetscCall(potential_->dofs().scatter(y, rods_, work_->increment));
     for (int r = rods_.begin; r < rods_.end; ++r)
-      if (work_->wanted[r] && work_->shift[r] > 0 &&
+      if (work_->active[r] && work_->shift[r] > 0 &&
           work_->edge_metric[potential_->elements().rods[r].first_slot] > 0) { // what hangs on one place swings
         const double size = sizeOf(r, work_->increment);
         if (!(size > longest)) continue;
@@ -184,7 +184,7 @@ PetscErrorCode NewtonSolver::includeMotion(Vec y) {
     potential_->blocks().multiply(rod, work_->motion, right);
     dofs.fold(rod, right);
   }
-  PetscCall(dofs.gather(right, rods_, right_, &work_->wanted));
+  PetscCall(dofs.gather(right, rods_, right_, &work_->active));
   PetscCall(SNESGetKSP(snes_, &ksp));
   PetscCall(KSPSolve(ksp, right_, y));
   PetscFunctionReturn(0);

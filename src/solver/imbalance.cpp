@@ -70,11 +70,11 @@ std::string imbalanceOf(IncrementalPotential &potential, int r, const Asked &ask
   return text.str();
 }
 
-int farthestRod(IncrementalPotential &potential, RodSet rods, const Asked &asked, const std::vector<char> *wanted) {
+int farthestRod(IncrementalPotential &potential, RodSet rods, const Asked &asked, const std::vector<char> *active) {
   int farthest = -1;
   double most = -1;
   for (int r = rods.begin; r < rods.end; ++r) {
-    if (wanted && !(*wanted)[r]) continue;
+    if (active && !(*active)[r]) continue;
     const Residual residual = residualOf(potential, r);
     if (!residual.isFinite()) return r;
     if (const double here = excess(residual, asked.rtol); here > most) most = here, farthest = r;

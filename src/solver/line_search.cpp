@@ -163,7 +163,7 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
     lengths_.assign(rods_.end - rods_.begin, 0.0);
   }
   for (int r = rods_.begin; r < rods_.end && accepted; ++r) {
-    if (!work_->wanted[r]) continue;
+    if (!work_->active[r]) continue;
     double lambda;
     accepted = searchRod(r, &lambda);
     if (!before.empty()) lengths_[r - rods_.begin] = lambda;

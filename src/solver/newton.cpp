@@ -68,13 +68,13 @@ PetscErrorCode NewtonSolver::evaluate(Vec x, Vec f) {
   // which needs no Hessian.
   const Derivatives *d = nullptr;
   for (int r = rods_.begin; r < rods_.end; ++r) {
-    if (!work_->wanted[r]) continue;
+    if (!work_->active[r]) continue;
     const Residual &last = work_->residual[r];
     d = std::max(last.force, last.moment) < likely_ || sharesFactor() ? &potential_->gradient(r)
                                                                       : &potential_->derivatives({r, r + 1});
   }
   PetscCall(PetscLogEventEnd(events().derivatives, 0, 0, 0, 0));
-  if (d) PetscCall(potential_->dofs().gather(d->gradient, rods_, f, &work_->wanted));
+  if (d) PetscCall(potential_->dofs().gather(d->gradient, rods_, f, &work_->active));
   PetscFunctionReturn(0);
 }
 
@@ -96,7 +96,7 @@ PetscErrorCode NewtonSolver::assemble(Mat) {
   renew_ = false;
   secants_.clear();
   for (int r = rods_.begin; r < rods_.end; ++r)
-    if (work_->wanted[r]) potential_->derivatives({r, r + 1});
+    if (work_->active[r]) potential_->derivatives({r, r + 1});
   for (int r = rods_.begin; r < rods_.end; ++r) work_->shift[r] = follows_ ? regular_lift * firstShift(r) : 0;
   PetscCall(refill());
   PetscFunctionReturn(0);
@@ -139,7 +139,7 @@ PetscErrorCode NewtonSolver::refactor() {
   PetscFunctionReturn(0);
 }
 
-/// With the matrix factored last; rods that are not wanted have the solution zero.
+/// With the matrix factored last; rods that are not active have the solution zero.
 PetscErrorCode NewtonSolver::solveLinear(const Planes &right, Planes &solution) {
   PetscFunctionBeginUser;
   PetscCall(potential_->dofs().gather(right, rods_, right_));
@@ -163,15 +163,15 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
   for (int r = rods_.begin; r < rods_.end; ++r) {
     const RodRange &rod = potential_->elements().rods[r];
     Residual &residual = work_->residual[r];
-    if (work_->wanted[r]) { // a rod that has converged takes no part any more
+    if (work_->active[r]) { // a rod that has converged takes no part any more
       residual = potential_->residual(r, energyAtIterate(r));
       work_->moving[r] = moving && dot(rod, work_->motion, work_->motion) > 0;
       finite = finite && residual.isFinite();
       const Verdict verdict = residual.isFinite() && !work_->moving[r] ? judge(r, rtol) : Verdict::going;
       lost = lost || verdict == Verdict::lost;
       creeps_ = creeps_ || verdict == Verdict::saddle;
-      work_->wanted[r] = verdict != Verdict::answer;
-      done = done && !work_->wanted[r];
+      work_->active[r] = verdict != Verdict::answer;
+      done = done && !work_->active[r];
     }
     worst.include(residual);
   }
@@ -194,7 +194,7 @@ PetscErrorCode NewtonSolver::inertiaAtIterate(int *negative, double lift) {
   PetscFunctionBeginUser;
   watch().beat();
   focus();
-  fill(work_->wanted, true);
+  fill(work_->active, true);
   age_ = 0;
   PetscCall(assemble(jacobian_));
   for (int r = rods_.begin; r < rods_.end && potential_->step().hessian != HessianKind::exact; ++r)
@@ -218,7 +218,7 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
   PetscFunctionBeginUser;
   PetscCall(SNESGetTolerances(snes_, nullptr, &rtol_, nullptr, nullptr, nullptr));
   rtol_ *= sharpness_;
-  fill(work_->wanted, true);
+  fill(work_->active, true);
   fill(work_->standstill, Standstill());
   fill(work_->load_reach, std::nan(""));
   age_ = 0;

@@ -81,7 +81,7 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
   work_ = &work;
   if (circulatory_.emplace(potential, set); circulatory_->isNone()) circulatory_.reset();
   system_ = {&dofs,        set,         &potential.blocks(), &work.metric,
-             &work.wanted, &work.shift, &work.workspace,     potential.couplesPositions()};
+             &work.active, &work.shift, &work.workspace,     potential.couplesPositions()};
   const bool whole = set.begin == 0 && set.end == dofs.all().end;
   if (whole)
     PetscCall(DMCreateGlobalVector(dofs.dm(), x_.out()));

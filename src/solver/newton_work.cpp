@@ -40,10 +40,10 @@ std::vector<double> edgeMetric(const IncrementalPotential &potential) {
 } // namespace
 
 NewtonWork::NewtonWork(const IncrementalPotential &potential, int slots)
-    : wanted(potential.all().end, true), shift(wanted.size(), 0), last_shift(shift), negative(wanted.size(), 0),
-      zero(negative), indefinite(wanted.size(), false), energy(wanted.size()), energy_known(wanted.size(), false),
-      residual(wanted.size()), moving(wanted.size(), false), standstill(wanted.size()), left(wanted.size(), 0),
-      load_reach(wanted.size(), 0), load_energy(wanted.size(), 0), increment(slot_size, slots), coordinates(increment),
+    : active(potential.all().end, true), shift(active.size(), 0), last_shift(shift), negative(active.size(), 0),
+      zero(negative), indefinite(active.size(), false), energy(active.size()), energy_known(active.size(), false),
+      residual(active.size()), moving(active.size(), false), standstill(active.size()), left(active.size(), 0),
+      load_reach(active.size(), 0), load_energy(active.size(), 0), increment(slot_size, slots), coordinates(increment),
       trial(slots), motion(potential.dofs().makePlanes()), metric(shiftMetric(potential.elements(), potential.dofs())),
       edge_metric(edgeMetric(potential)) {}
 

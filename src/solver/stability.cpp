@@ -173,8 +173,8 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
   const Elements &e = potential_->elements();
   const std::vector<int> negative = work_->negative;
   const EdgeBlocks exact = potential_->derivatives(rods_).blocks;
-  found->assign(work_->wanted.size(), false);
-  neutral->assign(work_->wanted.size(), false);
+  found->assign(work_->active.size(), false);
+  neutral->assign(work_->active.size(), false);
   bool regular, done = false;
   enum class Try { buckling, shifted, shifted_anew };
   for (const Try way : {Try::buckling, Try::shifted, Try::shifted_anew}) {

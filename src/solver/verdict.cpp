@@ -202,7 +202,7 @@ std::string NewtonSolver::roundingMessage(int r, double size) const {
 
 /// The rod that is farthest from its equilibrium, in words.
 std::string NewtonSolver::farthest() {
-  const int rod = farthestRod(*potential_, rods_, asked(), &work_->wanted);
+  const int rod = farthestRod(*potential_, rods_, asked(), &work_->active);
   if (rod >= 0 && isAtNoise(potential_->residual(rod, energyAtIterate(rod)), 0))
     return "; " + roundingMessage(rod, sizeOf(rod, work_->increment));
   return tellImbalance(*potential_, rod, asked());

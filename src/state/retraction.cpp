@@ -298,7 +298,7 @@ static void moveAll(const RodRange &rod, const Vec3 &by, C &to) {
     const auto frames = cellFrames<T>(to, cell, count);
     const T principal = halfAngleBetween(frames[0], frames[1]).angle();
     const T turns = T(2 * pi) * floor((expected - principal) * T(0.5 / pi) + T(0.5));
-    write(to[C::turns] + cell.slot, turns);
+    write(to[C::winding] + cell.slot, turns);
     write(to[C::twist] + cell.slot, T(principal + turns));
     if (!barrier) return;
     auto crossed = turns != T(0.0) || crossesFold(cellFrames<T>(from, cell, count), frames);

@@ -60,7 +60,7 @@ State initialState(const Scene &scene, const Elements &elements) {
   s.position_low.assign(s.position.size(), Vec3::Zero());
   s.twist_rate.assign(s.director.size(), 0.0);
   s.axial_force.assign(s.director.size(), 0.0);
-  s.turns.assign(elements.cell_slot.size(), 0.0);
+  s.winding.assign(elements.cell_slot.size(), 0.0);
   const Configuration c = configurationOf(s, scene, elements, 0);
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
     const Rod &rod = scene.rods[r];
@@ -69,7 +69,7 @@ State initialState(const Scene &scene, const Elements &elements) {
     for (int i = 0; i < rod.edges(); ++i) length += rod.edge(i).norm();
     for (int n = elements.rod_cells[r]; n < elements.rod_cells[r + 1]; ++n) {
       const double expected = 2 * pi * rod.initial_turns * elements.cellLength()[elements.cell_slot[n]] / length;
-      s.turns[n] = 2 * pi * std::round((expected - c[Configuration::twist][elements.cell_slot[n]]) / (2 * pi));
+      s.winding[n] = 2 * pi * std::round((expected - c[Configuration::twist][elements.cell_slot[n]]) / (2 * pi));
     }
   }
   for (const Support &support : scene.supports)
@@ -106,7 +106,7 @@ void setTargets(const Scene &scene, const Elements &elements, double motion_time
   using std::sqrt;
   const RodRange &rod = elements.rods[r];
   for (int n = elements.rod_cells[r]; n < elements.rod_cells[r + 1]; ++n)
-    c[C::turns][elements.cell_slot[n]] = state.turns[n];
+    c[C::winding][elements.cell_slot[n]] = state.winding[n];
   for (int a = 0; a < 3; ++a) { // plane by plane
     double *high = c[C::Plane(C::position + a)] + rod.first_slot,
            *low = c[C::Plane(C::position_low + a)] + rod.first_slot;
@@ -140,7 +140,7 @@ void setTargets(const Scene &scene, const Elements &elements, double motion_time
   forCells(elements, r, [&]<class T>(const LooseCell &cell, int count) {
     const auto frames = cellFrames<T>(c, cell, count);
     write(c[C::twist] + cell.slot,
-          T(halfAngleBetween(frames[0], frames[1]).angle() + read<T>(c[C::turns] + cell.slot)));
+          T(halfAngleBetween(frames[0], frames[1]).angle() + read<T>(c[C::winding] + cell.slot)));
   });
 }
 

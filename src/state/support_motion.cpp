@@ -78,7 +78,7 @@ void SupportMotion::follow(int r, Configuration &iterate) {
   forCells(elements_, r, [&]<class T>(const LooseCell &cells, int count) {
     for (int l = 0; l < count; ++l) {
       const LooseCell cell{cells.slot + l, cells.frame0 + l, cells.frame1 + l, cells.vertex + l};
-      double &twist = iterate[C::twist][cell.slot], &turns = iterate[C::turns][cell.slot];
+      double &twist = iterate[C::twist][cell.slot], &turns = iterate[C::winding][cell.slot];
       const double expected = twist + turning(cell.frame1) - turning(cell.frame0);
       const double principal = halfAngleBetween(iterate.frameAt(cell.frame0), iterate.frameAt(cell.frame1)).angle();
       turns = 2 * pi * std::round((expected - principal) / (2 * pi));

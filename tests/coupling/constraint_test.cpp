@@ -6,7 +6,7 @@
 #include "support/rods.hpp"
 #include "tendril/energy/constraint.hpp"
 #include "tendril/energy/derived.hpp"
-#include "tendril/model/redraw.hpp"
+#include "tendril/model/remesh.hpp"
 
 namespace tendril::test {
 namespace {
@@ -319,7 +319,7 @@ TEST(Constraints, AreOfSecondOrderWithTheEdges) {
   std::vector<Vec3> ends;
   for (const int edges : {15, 45, 135, 405}) {
     Simulation sim;
-    runTo(sim, redraw(written, {Drawing{}}, {edges}), statics());
+    runTo(sim, remesh(written, {Drawing{}}, {edges}), statics());
     ends.push_back(sim.state.position.back());
   }
   for (int k = 0; k < 2; ++k) {
@@ -327,7 +327,7 @@ TEST(Constraints, AreOfSecondOrderWithTheEdges) {
     EXPECT_NEAR(ratio, 9, 0.4) << k;
   }
   EXPECT_GT((ends[0] - ends[1]).norm(), 1e-6);
-  EXPECT_THROW(redraw(written, {Drawing{}}, {10}), SceneError);
+  EXPECT_THROW(remesh(written, {Drawing{}}, {10}), SceneError);
 }
 
 } // namespace

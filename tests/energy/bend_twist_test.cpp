@@ -121,7 +121,7 @@ TEST(BendTwist, AngleMeasureIsSmoothThroughWholeTurns) {
   Random random(3);
   for (const double turns : {-3.0, -2.0, 1.0, 2.0}) {
     RandomCell c = randomCell(random, 0.7);
-    c.cell.turns = 2 * pi * turns;
+    c.cell.winding = 2 * pi * turns;
     c.cell.sign = std::fmod(turns, 2.0) == 0 ? 1 : -1;
     expectDerivativesMatch<Measure::angle>(c);
   }
@@ -130,7 +130,7 @@ TEST(BendTwist, AngleMeasureIsSmoothThroughWholeTurns) {
   auto strainAt = [&](double angle, double turns) {
     Frame f1 = c.f1;
     f1.director = rotateAbout<double>(transport<double>(c.f0.director, c.f0.tangent, f1.tangent), f1.tangent, angle);
-    c.cell.turns = 2 * pi * turns;
+    c.cell.winding = 2 * pi * turns;
     c.cell.sign = turns == 0 ? 1 : -1;
     return cellStrain<Measure::angle>(c.f0, f1, c.cell);
   };
@@ -163,7 +163,7 @@ TEST(BendTwist, PackLanesEqualScalars) {
   f0.length = gather([](const RandomCell &c) { return c.f0.length; });
   f1.length = gather([](const RandomCell &c) { return c.f1.length; });
   cell.base = gather([](const RandomCell &c) { return c.cell.base; });
-  cell.turns = Pack(0.0);
+  cell.winding = Pack(0.0);
   cell.sign = Pack(1.0);
   CellDerivatives<Pack> packed;
   cellDerivatives<Measure::angle>(f0, f1, cell, packed);

@@ -133,7 +133,7 @@ TEST(EndCouple, EdgesChosenForItsEnergyMeetTheTolerance) {
   Choice choice;
   EXPECT_PETSC(chooseEdges(file.scene, file.drawings, statics(4), {tolerance, Quantity::energy}, &choice));
   Simulation run;
-  runTo(run, redraw(file.scene, file.drawings, choice.edges), statics(4));
+  runTo(run, remesh(file.scene, file.drawings, choice.edges), statics(4));
   const double error = std::abs(energyBudget(run.scene, *run.elements, run.state, 1).bend - exact) / exact;
   EXPECT_LT(error, tolerance);
   EXPECT_GT(error, tolerance / 2) << "too many edges: " << choice.edges[0];

@@ -80,7 +80,7 @@ TEST(AccuracyInDynamics, IsMetOnTheReleasedCantilever) {
       EXPECT_PETSC(chooseEdgesAndSteps(file.scene, file.drawings, settingsOf(integrator, 0.005, 1),
                                        {tolerance, Quantity::tip}, &choice));
       const double error =
-          rmsOfLast(positionsAt(times, redraw(file.scene, file.drawings, choice.edges), choice.loop), exact);
+          rmsOfLast(positionsAt(times, remesh(file.scene, file.drawings, choice.edges), choice.loop), exact);
       EXPECT_LT(error, tolerance) << integrator;
       EXPECT_GT(error, tolerance / 4) << integrator << ": too dear, edges " << choice.edges[0] << ", dt "
                                       << choice.loop.dt; // 0.5 to 0.6 of it
@@ -111,14 +111,14 @@ TEST(AccuracyInDynamics, IsMetOnASpring) {
   const std::vector<double> times = timesTo(1, 20);
   const LoopSettings fine = settingsOf("bdf2", 2e-3, 1);
   const std::vector<std::vector<Vec3>> reference =
-      positionsAt(times, redraw(file.scene, file.drawings, {512}), fine); // off by about a tenth of the tolerance
+      positionsAt(times, remesh(file.scene, file.drawings, {512}), fine); // off by about a tenth of the tolerance
   for (const bool adapts : {false, true}) {
     LoopSettings settings = settingsOf("bdf2", 0.02, 1);
     settings.adapt = adapts ? Adaptation::error : Adaptation::none;
     Choice choice;
     EXPECT_PETSC(chooseEdgesAndSteps(file.scene, file.drawings, settings, {1e-3, Quantity::tip}, &choice));
     const double error =
-        rmsOfLast(positionsAt(times, redraw(file.scene, file.drawings, choice.edges), choice.loop), reference) /
+        rmsOfLast(positionsAt(times, remesh(file.scene, file.drawings, choice.edges), choice.loop), reference) /
         lengthOf(file.scene.rods[0]);
     EXPECT_LT(error, 1e-3);
     EXPECT_GT(error, 1e-3 / 10) << "too dear, edges " << choice.edges[0] << (adapts ? ", dt_rtol " : ", dt ")

@@ -36,9 +36,9 @@ void estimateOf(const SceneFile &file, const std::vector<int> &edges, const Loop
   std::vector<int> twice = edges;
   for (int &n : twice) n *= 2;
   Answer answer;
-  EXPECT_PETSC(solveStatics(run, redraw(file.scene, file.drawings, edges), settings, &answer));
+  EXPECT_PETSC(solveStatics(run, remesh(file.scene, file.drawings, edges), settings, &answer));
   ASSERT_TRUE(answer.found);
-  EXPECT_PETSC(estimateError(run, answer.rounding_error, answer.critical, redraw(file.scene, file.drawings, twice),
+  EXPECT_PETSC(estimateError(run, answer.rounding_error, answer.critical, remesh(file.scene, file.drawings, twice),
                              settings, &estimate));
 }
 
@@ -92,7 +92,7 @@ TEST(ErrorEstimate, OfPointsIsThatOfTheirCurve) {
   Simulation curve, points;
   Estimate of_curve, of_points;
   estimateOf(file, {64}, statics(), curve, of_curve);
-  file.scene = redraw(file.scene, file.drawings, {64});
+  file.scene = remesh(file.scene, file.drawings, {64});
   file.drawings[0].curve = nullptr;
   estimateOf(file, {64}, statics(), points, of_points);
   EXPECT_NEAR(of_points.relativeError(), of_curve.relativeError(),
@@ -115,7 +115,7 @@ TEST(ErrorEstimate, TellsWhenAnswersAreNotNeighbours) {
   Simulation coarse, fine;
   Answer a, b;
   EXPECT_PETSC(solveStatics(coarse, file.scene, statics(), &a));
-  Scene up = redraw(file.scene, file.drawings, {32});
+  Scene up = remesh(file.scene, file.drawings, {32});
   up.forces[0].force *= -1;
   EXPECT_PETSC(solveStatics(fine, up, statics(), &b));
   const Estimate e = richardson(coarse.scene, a, b);
@@ -140,7 +140,7 @@ TEST(Accuracy, IsMetOnTheElastica) {
       Choice choice;
       EXPECT_PETSC(chooseEdges(file.scene, file.drawings, statics(), {tolerance, of}, &choice));
       Simulation run;
-      runTo(run, redraw(file.scene, file.drawings, choice.edges), statics());
+      runTo(run, remesh(file.scene, file.drawings, choice.edges), statics());
       const double error = (run.state.position.back() - elasticaTip(10)).norm();
       EXPECT_LT(error, tolerance);
       EXPECT_GT(error, tolerance / 2) << "too many edges: " << choice.edges[0];
@@ -153,7 +153,7 @@ TEST(Accuracy, OfTheEnergyIsMetOnTheElastica) {
   Choice choice;
   EXPECT_PETSC(chooseEdges(file.scene, file.drawings, statics(), {1e-4, Quantity::energy}, &choice));
   Simulation run;
-  runTo(run, redraw(file.scene, file.drawings, choice.edges), statics());
+  runTo(run, remesh(file.scene, file.drawings, choice.edges), statics());
   const double exact = 1.79535565212409; // elastica_tip_load.csv
   EXPECT_NEAR(energyBudget(run.scene, *run.elements, run.state, 1).bend, exact, 1e-4 * exact);
 }
@@ -164,7 +164,7 @@ TEST(Accuracy, IsMetOnASpring) {
     Choice choice;
     EXPECT_PETSC(chooseEdges(file.scene, file.drawings, statics(10), {tolerance}, &choice));
     Simulation run;
-    runTo(run, redraw(file.scene, file.drawings, choice.edges), statics(10));
+    runTo(run, remesh(file.scene, file.drawings, choice.edges), statics(10));
     const double error = springError(run.state.position);
     EXPECT_LT(error, tolerance);
     EXPECT_GT(error, tolerance / 3) << "too many edges: "
@@ -186,7 +186,7 @@ Price priceOf(const SceneFile &file, const LoopSettings &settings, double tolera
   double length = 0;
   for (const int m : {n, 2 * n, 4 * n}) {
     Simulation run;
-    runTo(run, redraw(file.scene, file.drawings, {m}), settings);
+    runTo(run, remesh(file.scene, file.drawings, {m}), settings);
     x.push_back(run.state.position);
     length = 0;
     for (int i = 0; i < m; ++i) length += run.scene.rods[0].edge(i).norm();
@@ -242,7 +242,7 @@ TEST(ErrorEstimate, OfGradedEdgesIsThatOfACleanSeries) {
   std::vector<std::vector<Vec3>> x;
   for (int factor = 1; factor <= 8; factor *= 2) {
     Simulation run;
-    runTo(run, redraw(file.scene, file.drawings, {factor * n}), statics(4));
+    runTo(run, remesh(file.scene, file.drawings, {factor * n}), statics(4));
     x.push_back(run.state.position);
   }
   double error[3] = {0, 0, 0};

@@ -79,7 +79,7 @@ TEST(StateAccess, PositionsTakeFramesAndForcesAlong) {
   LoopSettings settings = dynamics(0.01, 1);
   Simulation sim;
   EXPECT_PETSC(sim.setUp(springScene(false), settings));
-  sim.state.turns[2 + 7] = 2 * pi; // of the spring, behind two cells of the first rod
+  sim.state.winding[2 + 7] = 2 * pi; // of the spring, behind two cells of the first rod
   const double energy = energyOf(sim);
   RodAccess rod(sim, 1);
   const std::vector<double> twists = rod.twists();

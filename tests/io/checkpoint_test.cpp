@@ -142,7 +142,7 @@ TEST(Checkpoint, LeavesOutWhatAnotherIntegratorRemembers) {
     const State &read = taken.sim.state;
     EXPECT_EQ(read == state, name == "bdf2") << name;
     EXPECT_EQ(read.memory.empty() && read.strains.empty() && read.last_dt == 0, name != "bdf2") << name;
-    EXPECT_TRUE(read.position == state.position && read.turns == state.turns && read.time == state.time) << name;
+    EXPECT_TRUE(read.position == state.position && read.winding == state.winding && read.time == state.time) << name;
     if (name != "bdf2") EXPECT_TRUE(says(taken.all(), "integrator: bdf2 -> " + name));
   }
 }
@@ -184,7 +184,7 @@ TEST(Checkpoint, EveryFlippedBitIsFound) {
   inside(s.velocity.data(), s.velocity.size() * sizeof(Vec3));
   inside(s.twist_rate.data(), s.twist_rate.size() * sizeof(double));
   inside(s.axial_force.data(), s.axial_force.size() * sizeof(double));
-  inside(s.turns.data(), s.turns.size() * sizeof(double));
+  inside(s.winding.data(), s.winding.size() * sizeof(double));
   inside(s.memory[1].vertex.data(), s.memory[1].vertex.size() * sizeof(Vec3));
   inside(s.strains.data(), s.strains.size() * sizeof(double));
   inside(&s.time, sizeof s.time);
@@ -289,11 +289,11 @@ TEST(Checkpoint, TurnsStayWhereSupportsComeAndGo) {
   const LoopSettings settings = settingsOf("bdf2");
   Simulation sim;
   EXPECT_PETSC(sim.setUp(held, settings));
-  for (double &t : sim.state.turns) t = 2 * pi;
+  for (double &t : sim.state.winding) t = 2 * pi;
   writeCheckpoint(path, sim, {}, RunFacts(held, settings));
   const Taken taken(path, free, settings);
-  const std::vector<double> &turns = taken.sim.state.turns;
-  EXPECT_EQ(turns.size() + 1, sim.state.turns.size());
+  const std::vector<double> &turns = taken.sim.state.winding;
+  EXPECT_EQ(turns.size() + 1, sim.state.winding.size());
   EXPECT_EQ(std::count(turns.begin(), turns.end(), 4 * pi), 1);
   EXPECT_EQ(std::count(turns.begin(), turns.end(), 2 * pi), std::ptrdiff_t(turns.size()) - 1);
   writeCheckpoint(back, taken.sim, taken.control, RunFacts(free, settings));
@@ -319,7 +319,7 @@ TEST(Checkpoint, StaticsAndDynamicsFollowEachOther) {
     EXPECT_EQ(s.time, 0);
     EXPECT_EQ(s.step, 0);
     EXPECT_TRUE(s.position == written.sim.state.position && s.director == written.sim.state.director &&
-                s.turns == written.sim.state.turns);
+                s.winding == written.sim.state.winding);
     for (const Vec3 &v : s.velocity) EXPECT_EQ(v.norm(), 0);
     for (const double w : s.twist_rate) EXPECT_EQ(w, 0);
     EXPECT_TRUE(s.memory.empty());
@@ -351,7 +351,7 @@ TEST(Checkpoint, RunsGoOnToTheSameBits) {
           if (writes && state.time > 0.07) {
             writeCheckpoint(path, sim, loop.control, RunFacts(sim.scene, settings));
             writes = false;
-            EXPECT_TRUE(std::any_of(state.turns.begin(), state.turns.begin() + sim.elements->rod_cells[1],
+            EXPECT_TRUE(std::any_of(state.winding.begin(), state.winding.begin() + sim.elements->rod_cells[1],
                                     [](double t) { return t != 0; }));
             const bool forgets = name == "euler" || name == "sdirk2" || name == "symplectic2";
             EXPECT_EQ(state.memory.empty(), forgets);

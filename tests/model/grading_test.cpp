@@ -1,5 +1,5 @@
 /// Edges graded by curvature: where they are short, what stays a vertex, what stays uniform.
-#include "tendril/model/redraw.hpp"
+#include "tendril/model/remesh.hpp"
 
 #include "support/rods.hpp"
 
@@ -39,7 +39,7 @@ TEST(Grading, IsShortWhereTheDrawingBends) {
     const std::vector<Drawing> drawings = graded(scene, curve);
     EXPECT_EQ(edgeMultiple(scene, drawings[0], 0), 1);
     double growth;
-    const Rod few = redraw(scene, drawings, {8}).rods[0], many = redraw(scene, drawings, {64}).rods[0];
+    const Rod few = remesh(scene, drawings, {8}).rods[0], many = remesh(scene, drawings, {64}).rods[0];
     EXPECT_GT(longest(few, growth), 1.1);
     EXPECT_LT(growth, 1.5);
     EXPECT_LT(longest(many, growth), 2.2);
@@ -53,7 +53,7 @@ TEST(Grading, CutsEveryEdgeInTwo) {
   const Scene scene = clampedScene(inextensibleRod(parabola(24).points));
   for (const Curve &curve : {parabola(24).curve, Curve()}) {
     const std::vector<Drawing> drawings = graded(scene, curve);
-    const Scene coarse = redraw(scene, drawings, {19}), fine = redraw(scene, drawings, {38});
+    const Scene coarse = remesh(scene, drawings, {19}), fine = remesh(scene, drawings, {38});
     for (int v = 0; v <= 19; ++v) EXPECT_EQ(coarse.rods[0].position[v], fine.rods[0].position[2 * v]); // to the bit
   }
 }
@@ -80,7 +80,7 @@ TEST(Grading, SparesDearMultiples) {
   scene.forces = {{0, 501, Vec3(0, 0, 1)}};
   const std::vector<Drawing> drawings = graded(scene, lineShape(Vec3::Zero(), Vec3::UnitX(), 1000).curve);
   EXPECT_EQ(edgeMultiple(scene, drawings[0], 0), 2); // uniform edges would come in thousands
-  const Scene coarse = redraw(scene, drawings, {10});
+  const Scene coarse = remesh(scene, drawings, {10});
   EXPECT_EQ(coarse.forces[0].vertex, 5);
   EXPECT_LT((coarse.rods[0].position[5] - Vec3(0.501, 0, 0)).norm(), 1e-15);
 }
@@ -96,13 +96,13 @@ TEST(Grading, NamedVerticesAndCornersStay) {
   const int multiple = edgeMultiple(scene, drawings[0], 0);
   EXPECT_LE(multiple, 8); // instead of 50
   for (const int n : {multiple, 5 * multiple}) {
-    const Scene drawn = redraw(scene, drawings, {n});
+    const Scene drawn = remesh(scene, drawings, {n});
     EXPECT_LT((drawn.rods[0].position[drawn.forces[0].vertex] - points[13]).norm(), 1e-14);
     EXPECT_LT((drawn.rods[0].position[drawn.supports[1].vertex] - points[41]).norm(), 1e-14);
     EXPECT_TRUE(std::any_of(drawn.rods[0].position.begin(), drawn.rods[0].position.end(),
                             [&](const Vec3 &x) { return (x - points[30]).norm() < 1e-14; }));
   }
-  EXPECT_THROW(redraw(scene, drawings, {5 * multiple + 1}), SceneError);
+  EXPECT_THROW(remesh(scene, drawings, {5 * multiple + 1}), SceneError);
 }
 
 TEST(Grading, GoesRoundClosedRods) {
@@ -115,7 +115,7 @@ TEST(Grading, GoesRoundClosedRods) {
   setBishopDirectors(rod);
   scene.forces = {{0, 30, Vec3::UnitY()}};
   const std::vector<Drawing> drawings = graded(scene, {});
-  const Scene drawn = redraw(scene, drawings, {48});
+  const Scene drawn = remesh(scene, drawings, {48});
   ASSERT_EQ(drawn.rods[0].edges(), 48);
   EXPECT_LT((drawn.rods[0].position[drawn.forces[0].vertex] - ellipse[30]).norm(), 1e-14);
   const Rod &r = drawn.rods[0];
@@ -146,7 +146,7 @@ TEST(Grading, GivenDirectorsKeepTheirTwist) {
   };
   for (int i = 0; i < 24; ++i) rod.director[i] = twisted(rod, i);
   const Scene scene = clampedScene(rod);
-  const Rod fine = redraw(scene, graded(scene, curve, true), {96}).rods[0];
+  const Rod fine = remesh(scene, graded(scene, curve, true), {96}).rods[0];
   for (int i = 0; i < 96; ++i)
     EXPECT_LT((fine.director[i] - twisted(fine, i)).norm(), 1e-3); // h^2/8 of an edge as written
 }
@@ -158,7 +158,7 @@ TEST(Grading, TangentsOfSupportsAreOfSecondOrder) {
     const std::vector<Drawing> drawings = graded(scene, parabola(24).curve);
     const double x = 7.0 / 24;
     const Vec3 exact = Vec3(1, 4 * x, 0).normalized();
-    return (redraw(scene, drawings, {factor * edgeMultiple(scene, drawings[0], 0)}).supports[1].frame.tangent - exact)
+    return (remesh(scene, drawings, {factor * edgeMultiple(scene, drawings[0], 0)}).supports[1].frame.tangent - exact)
         .norm();
   };
   EXPECT_GT(order(error(8), error(16)), 1.9);
@@ -171,7 +171,7 @@ TEST(Grading, TangentsOfSupportsLeanToTheShorterEdge) {
     Scene scene = clampedScene(inextensibleRod(parabola(24).points));
     scene.supports.push_back(hold(scene, 0, v, Support::Kind::clamp));
     const std::vector<Drawing> drawings = graded(scene, parabola(24).curve);
-    const Scene fine = redraw(scene, drawings, {16 * edgeMultiple(scene, drawings[0], 0)});
+    const Scene fine = remesh(scene, drawings, {16 * edgeMultiple(scene, drawings[0], 0)});
     const int at = fine.supports[1].vertex;
     const Vec3 exact = Vec3(1, 4 * v / 24.0, 0).normalized();
     const Frame before = referenceFrame(fine.rods[0], at - 1), after = referenceFrame(fine.rods[0], at);

@@ -13,7 +13,7 @@ struct Problem {
   Scene scene;
   DofMap dofs;
   BandedSystem system;
-  std::vector<char> wanted;
+  std::vector<char> active;
   std::vector<double> shift;
   EdgeBlocks blocks;
   Planes metric;
@@ -79,9 +79,9 @@ void fill(Problem &p, double diagonal, double spread = 1) {
   for (const RodRange &rod : p.dofs.rods())
     for (int i = 0; i < rod.vertices; ++i)
       for (int a = 0; a < slot_size; ++a) p.metric[a][rod.slot(i)] = 1;
-  p.wanted.assign(p.dofs.rods().size(), true);
-  p.shift.assign(p.wanted.size(), 0);
-  p.system = {&p.dofs, p.dofs.all(), &p.blocks, &p.metric, &p.wanted, &p.shift};
+  p.active.assign(p.dofs.rods().size(), true);
+  p.shift.assign(p.active.size(), 0);
+  p.system = {&p.dofs, p.dofs.all(), &p.blocks, &p.metric, &p.active, &p.shift};
 }
 
 int negativeEigenvalues(const Eigen::MatrixXd &a) {
@@ -199,9 +199,9 @@ TEST(Banded, KeepsItsDigitsOnFineMeshes) {
     ASSERT_EQ(p.dofs.setUp(p.scene), PetscErrorCode(0));
     p.blocks = EdgeBlocks(p.dofs.slots());
     p.metric = p.dofs.makePlanes();
-    p.wanted = {true};
+    p.active = {true};
     p.shift = {0};
-    p.system = {&p.dofs, p.dofs.all(), &p.blocks, &p.metric, &p.wanted, &p.shift};
+    p.system = {&p.dofs, p.dofs.all(), &p.blocks, &p.metric, &p.active, &p.shift};
     const RodRange &rod = p.dofs.rods()[0];
     const double h = 1.0 / edges, cell = 1 / (h * h * h);
     for (int i = 0; i < edges; ++i) {
@@ -238,12 +238,12 @@ TEST(Banded, RodsThatAreNotWantedStandStill) {
   Eigen::VectorXd b = Eigen::VectorXd::Constant(p.dense.rows(), 1.0), all(b.size()), some(b.size());
   banded.factor(p.system);
   banded.solve(b.data(), all.data());
-  for (std::size_t r = 0; r < p.wanted.size(); ++r) p.wanted[r] = r % 3 == 1;
+  for (std::size_t r = 0; r < p.active.size(); ++r) p.active[r] = r % 3 == 1;
   banded.factor(p.system);
   banded.solve(b.data(), some.data());
-  for (std::size_t r = 0; r < p.wanted.size(); ++r) {
+  for (std::size_t r = 0; r < p.active.size(); ++r) {
     const PetscInt u = p.dofs.unknown(p.dofs.rods()[r].slot(2), 1);
-    EXPECT_NEAR(some[u], p.wanted[r] ? all[u] : 0.0, 1e-14);
+    EXPECT_NEAR(some[u], p.active[r] ? all[u] : 0.0, 1e-14);
   }
 }
 

@@ -51,7 +51,7 @@ inline RandomCell randomCell(Random &random, double fold) {
   c.cell.base = 0;
   c.cell.weight = {0.5 + 0.1 * random(), 0.5 + 0.1 * random()};
   c.cell.free = {1, 1};
-  c.cell.turns = 0;
+  c.cell.winding = 0;
   c.cell.sign = 1;
   return c;
 }
@@ -74,7 +74,7 @@ template <class T> CellOf<T> cast(const CellOf<double> &c) {
     r.free[k] = T(c.free[k]);
   }
   r.base = T(c.base);
-  r.turns = T(c.turns);
+  r.winding = T(c.winding);
   r.sign = T(c.sign);
   return r;
 }

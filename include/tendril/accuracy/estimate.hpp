@@ -5,7 +5,7 @@
 /// the second.
 
 #include "tendril/dynamics/simulation.hpp"
-#include "tendril/model/redraw.hpp"
+#include "tendril/model/remesh.hpp"
 
 namespace tendril {
 
@@ -60,7 +60,7 @@ Estimate richardson(const Scene &scene, const Answer &coarse, const Answer &fine
 
 /// Solves with twice the edges, starting from the answer at hand so that both are on one branch of equilibria; where
 /// Newton does not find it from there, or critical loads were found on the way, by the load steps of the run. \param
-/// rounding_error of the run, over rod lengths \param fine the scene of `run` redrawn with twice the edges
+/// rounding_error of the run, over rod lengths \param fine the scene of `run` remeshed with twice the edges
 PetscErrorCode estimateError(const Simulation &run, double rounding_error, const std::vector<double> &critical,
                              const Scene &fine, const LoopSettings &settings, Estimate *estimate);
 

@@ -8,7 +8,7 @@
 namespace tendril {
 
 /// Old vertices stay, new ones lie on the curve through them (curveThrough), where they cut the edges at rest; twist,
-/// with its whole turns, is spread as it was; at rest. \param fine the scene of `scene` redrawn with twice the edges
+/// with its whole turns, is spread as it was; at rest. \param fine the scene of `scene` remeshed with twice the edges
 State prolonged(const State &state, const Scene &scene, const Elements &elements, const Scene &fine,
                 const Elements &fine_elements);
 

@@ -20,7 +20,7 @@ template <class T> CellOf<T> readCell(const Planes &cells, int slot) {
     c.free[k] = read<T>(cells[cell_free + k] + slot);
   }
   c.base = read<T>(cells[cell_base] + slot);
-  c.turns = T(0.0);
+  c.winding = T(0.0);
   c.sign = T(1.0);
   return c;
 }
@@ -29,8 +29,8 @@ template <class T> CellOf<T> readCell(const Planes &cells, int slot) {
 template <class T> CellOf<T> cellOf(const Planes &cells, const Configuration &c, int slot) {
   using std::floor;
   CellOf<T> cell = readCell<T>(cells, slot);
-  cell.turns = read<T>(c[Configuration::turns] + slot);
-  const T half = floor(cell.turns * T(0.5 / pi) + T(0.5)) * T(0.5);
+  cell.winding = read<T>(c[Configuration::winding] + slot);
+  const T half = floor(cell.winding * T(0.5 / pi) + T(0.5)) * T(0.5);
   cell.sign = T(1.0) - T(4.0) * (half - floor(half)); // -1 when their number is odd
   return cell;
 }

@@ -4,7 +4,7 @@
 
 #include "tendril/io/material_reader.hpp"
 #include "tendril/io/rod_names.hpp"
-#include "tendril/model/redraw.hpp"
+#include "tendril/model/remesh.hpp"
 
 #include <set>
 

@@ -52,8 +52,8 @@ public:
     return rods_[rods.end - 1].first_slot + rods_[rods.end - 1].slots - rods_[rods.begin].first_slot;
   }
 
-  /// out = values of the unknowns of some rods; of these, rods not `wanted` (by scene order) get zero.
-  PetscErrorCode gather(const Planes &values, RodSet rods, Vec out, const std::vector<char> *wanted = nullptr) const;
+  /// out = values of the unknowns of some rods; of these, rods not `active` (by scene order) get zero.
+  PetscErrorCode gather(const Planes &values, RodSet rods, Vec out, const std::vector<char> *active = nullptr) const;
   /// Values of the rods' slots from unknowns: zero where held, copies behind rings included.
   PetscErrorCode scatter(Vec in, RodSet rods, Planes &values) const;
 

@@ -2,7 +2,7 @@
 /// \file alike.hpp
 /// Rods that do the same, as copies do: what is found out for one of them holds for all.
 
-#include "tendril/model/redraw.hpp"
+#include "tendril/model/remesh.hpp"
 
 namespace tendril {
 

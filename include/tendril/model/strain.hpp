@@ -37,8 +37,8 @@ template <class T> struct CellOf {
   T base; ///< factor of the bending strains = base + weight0 l0 + weight1 l1: lbar / Lbar (`seed`) or 1 (`classical`)
   std::array<T, 2> weight; ///< [1/m]
   std::array<T, 2> free;
-  T turns; ///< 2 pi x whole turns in the twist angle (`angle` measure; 0 for `tan`) [rad]
-  T sign;  ///< -1 when the number of whole turns is odd, else 1
+  T winding; ///< 2 pi x whole turns in the twist angle (`angle` measure; 0 for `tan`) [rad]
+  T sign;    ///< -1 when the number of whole turns is odd, else 1
 };
 
 /// phi(z) = atan(sqrt z)/sqrt z and two derivatives, z = tan^2 of half the turning angle: the factor between the two
@@ -96,7 +96,7 @@ template <Measure measure, class T> std::array<T, 3> twistMeasure(const HalfAngl
     return {T(2.0) * tangent, slope, slope * tangent};
   } else {
     const HalfAngle<T> principal{half.cosine * cell.sign, half.sine * cell.sign};
-    return {principal.angle() + cell.turns, T(1.0), T(0.0)};
+    return {principal.angle() + cell.winding, T(1.0), T(0.0)};
   }
 }
 

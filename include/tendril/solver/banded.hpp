@@ -18,13 +18,13 @@ struct BandedWorkspace {
 };
 
 /// What there is to factor: blocks + shift x metric (of positions and twists, and of edge vectors) of the rods that are
-/// wanted.
+/// active.
 struct BandedSystem {
   const DofMap *dofs = nullptr;
   RodSet rods{0, 0};
   const EdgeBlocks *blocks = nullptr;
   const Planes *metric = nullptr;
-  const std::vector<char> *wanted =
+  const std::vector<char> *active =
       nullptr; ///< per rod of the scene; the others are left out, and a solve gives them zero
   const std::vector<double> *shift = nullptr; ///< per rod of the scene
   BandedWorkspace *workspace = nullptr;
@@ -71,7 +71,7 @@ private:
   std::size_t bytes_ = 0;
 
   bool sameShape(int a, int b) const;
-  std::size_t plan(const char *wanted);
+  std::size_t plan(const char *active);
   template <class T> void factorGroup(const Group &group, const BandedSystem &system);
   template <class T> void solveGroup(const Group &group, const PetscScalar *b, PetscScalar *x);
 };

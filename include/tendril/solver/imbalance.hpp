@@ -25,9 +25,9 @@ std::string labelOf(const Rod &rod);
 /// -snes_rtol), most at vertex 17". Empty where nothing is.
 std::string imbalanceOf(IncrementalPotential &potential, int rod, const Asked &asked);
 
-/// The rod whose residual is farthest above its tolerance. \param wanted per rod: whether it counts; -1 where none does
+/// The rod whose residual is farthest above its tolerance. \param active per rod: whether it counts; -1 where none does
 int farthestRod(IncrementalPotential &potential, RodSet rods, const Asked &asked,
-                const std::vector<char> *wanted = nullptr);
+                const std::vector<char> *active = nullptr);
 
 /// To be added to why something failed: "; rod 'spring' (128 edges): forces ..." of that rod, or nothing.
 std::string tellImbalance(IncrementalPotential &potential, int rod, const Asked &asked);

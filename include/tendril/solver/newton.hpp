@@ -80,7 +80,7 @@ struct NewtonWork {
   NewtonWork(const IncrementalPotential &potential, int slots);
   /// Moves the work arrays to the rods from this slot on.
   void setOrigin(int first_slot);
-  std::vector<char> wanted;              ///< rods that have not converged yet
+  std::vector<char> active;              ///< rods that have not converged yet
   std::vector<double> shift, last_shift; ///< of the diagonal of indefinite Hessians, now and when it was last needed
   std::vector<int> negative, zero;       ///< pivots
   std::vector<char> indefinite;          ///< rods whose Hessian gives no way down as it is

@@ -27,7 +27,7 @@ struct State {
   std::vector<double> twist_rate;  ///< (ne) [rad/s]
   std::vector<double> axial_force; ///< (ne) [N]
   std::vector<double>
-      turns;          ///< (cells) 2 pi x whole turns of the twist angle, carried by continuity (`angle` measure) [rad]
+      winding;        ///< (cells) 2 pi x whole turns of the twist angle, carried by continuity (`angle` measure) [rad]
   double last_dt = 0; ///< length of the step that led here; 0 where the integrator remembers nothing [s]
   double dt_before = 0;      ///< of the step before that; 0 where there was none [s]
   std::vector<Rates> memory; ///< what the integrator remembers of steps before
@@ -55,9 +55,9 @@ public:
     /// Axial strain, computed once: compilers contract the formula differently from place to place, and a stiff rod
     /// turns that last bit into forces.
     strain = 10,
-    spin = 11,  ///< turning of each director since the step began, summed over retractions [rad]
-    turns = 12, ///< of cells, as in State
-    twist = 13, ///< twist angle of cells with whole turns [rad]
+    spin = 11,    ///< turning of each director since the step began, summed over retractions [rad]
+    winding = 12, ///< of cells, as in State
+    twist = 13,   ///< twist angle of cells with whole turns [rad]
     axial_force = 14,
     /// Second word of the position: edges and displacements are known to rounding of their own size, not to that of the
     /// coordinates.

@@ -1,6 +1,6 @@
 /// Scenes with other numbers of edges: everything keeps its place, and the errors that are compared form one series.
 #include "tendril/dynamics/prolong.hpp"
-#include "tendril/model/redraw.hpp"
+#include "tendril/model/remesh.hpp"
 
 #include "support/rods.hpp"
 
@@ -11,12 +11,12 @@ Drawing drawingOf(const Polyline &shape) { return {shape.curve, false}; }
 
 const HelixShape helix{Vec3::Zero(), Vec3::UnitZ(), Vec3::UnitX(), 1, 0.5, 2, 0.2, 24};
 
-TEST(Redraw, VerticesSupportsAndForcesKeepTheirPlaces) {
+TEST(Remesh, VerticesSupportsAndForcesKeepTheirPlaces) {
   const Polyline shape = helixShape(helix);
   Scene scene = clampedScene(inextensibleRod(shape.points));
   scene.supports.push_back(hold(scene, 0, 16, Support::Kind::pin));
   scene.forces = {{0, 24, Vec3(0, 0, 1)}, {0, 12, Vec3(1, 0, 0)}};
-  const Scene fine = redraw(scene, {drawingOf(shape)}, {48});
+  const Scene fine = remesh(scene, {drawingOf(shape)}, {48});
   ASSERT_EQ(fine.rods[0].edges(), 48);
   for (int v = 0; v <= 24; ++v)
     EXPECT_LT((fine.rods[0].position[2 * v] - scene.rods[0].position[v]).norm(), 1e-14); // rounding
@@ -25,7 +25,7 @@ TEST(Redraw, VerticesSupportsAndForcesKeepTheirPlaces) {
   EXPECT_EQ(fine.forces[1].vertex, 24);
 }
 
-TEST(Redraw, NamedVerticesMustStayVertices) {
+TEST(Remesh, NamedVerticesMustStayVertices) {
   const Polyline shape = lineShape(Vec3::Zero(), Vec3::UnitX(), 24);
   Scene scene = clampedScene(straightRod(24));
   const Drawing curve = drawingOf(shape);
@@ -35,17 +35,17 @@ TEST(Redraw, NamedVerticesMustStayVertices) {
   scene.supports.push_back(hold(scene, 0, 12, Support::Kind::pin));
   EXPECT_EQ(edgeMultiple(scene, curve, 0), 6);
   EXPECT_EQ(edgeMultiple(scene, {}, 0), 24); // points all stay
-  EXPECT_EQ(redraw(scene, {curve}, {30}).supports[1].vertex, 15);
-  EXPECT_THROW(redraw(scene, {curve}, {31}), SceneError);
+  EXPECT_EQ(remesh(scene, {curve}, {30}).supports[1].vertex, 15);
+  EXPECT_THROW(remesh(scene, {curve}, {31}), SceneError);
 }
 
-TEST(Redraw, SupportsFollowTheRodUnlessTheSceneSaysHow) {
+TEST(Remesh, SupportsFollowTheRodUnlessTheSceneSaysHow) {
   const Polyline shape = helixShape(helix);
   Scene scene = clampedScene(inextensibleRod(shape.points));
-  const Scene fine = redraw(scene, {drawingOf(shape)}, {96});
+  const Scene fine = remesh(scene, {drawingOf(shape)}, {96});
   EXPECT_LT((fine.supports[0].frame.tangent - frameAtVertex(fine.rods[0], 0).tangent).norm(), 1e-14);
   scene.supports[0].tangent_given = true;
-  EXPECT_EQ(redraw(scene, {drawingOf(shape)}, {96}).supports[0].frame.tangent, scene.supports[0].frame.tangent);
+  EXPECT_EQ(remesh(scene, {drawingOf(shape)}, {96}).supports[0].frame.tangent, scene.supports[0].frame.tangent);
 }
 
 double midpointError(int edges) {
@@ -79,12 +79,12 @@ TEST(CurveThrough, RingsHaveNoEnds) {
   EXPECT_NEAR(curve(0.5 / 32).norm(), 1, 1e-4); // (h/2)^4 9/24 is 3e-5
 }
 
-TEST(Redraw, GivenDirectorsKeepTheirTwist) {
+TEST(Remesh, GivenDirectorsKeepTheirTwist) {
   Rod rod = straightRod(8);
   const double per_edge = 0.3;
   for (int i = 0; i < 8; ++i) rod.director[i] = rotateAbout<double>(Vec3::UnitY(), Vec3::UnitX(), per_edge * i);
   Scene scene = clampedScene(rod);
-  const Rod fine = redraw(scene, {{lineShape(Vec3::Zero(), Vec3::UnitX(), 8).curve, true}}, {16}).rods[0];
+  const Rod fine = remesh(scene, {{lineShape(Vec3::Zero(), Vec3::UnitX(), 8).curve, true}}, {16}).rods[0];
   for (int i = 0; i < 16; ++i) // the middle of edge i lies at (i + 1/2)/2 edges
     EXPECT_LT((fine.director[i] - rotateAbout<double>(Vec3::UnitY(), Vec3::UnitX(), per_edge * (0.5 * (i + 0.5) - 0.5)))
                   .norm(),
@@ -98,11 +98,11 @@ Vec3 tipUnderCouple(int edge, const Vec3 &couple, double torque, int factor) {
   scene.moments = {{0, edge, torque, couple}};
   scene.forces = {{0, 10, Vec3(0, 0.5, 0.2)}};
   Simulation sim;
-  runTo(sim, redraw(scene, {drawingOf(lineShape(Vec3::Zero(), Vec3::UnitX(), 10))}, {10 * factor}), statics());
+  runTo(sim, remesh(scene, {drawingOf(lineShape(Vec3::Zero(), Vec3::UnitX(), 10))}, {10 * factor}), statics());
   return sim.state.position.back();
 }
 
-TEST(Redraw, CouplesGiveACleanSeries) {
+TEST(Remesh, CouplesGiveACleanSeries) {
   for (const int edge : {0, 4, 8, 9})        // at the clamp, inside, by the end, and as an end couple
     for (const double torque : {0.0, 0.5}) { // one by one: with both, Newton stops where its linear convergence lets it
       const Vec3 couple = torque == 0 ? Vec3(0.3, 0.8, 1) : Vec3::Zero();
@@ -129,11 +129,11 @@ Vec3 tipOfParabola(int edge, const Vec3 &couple, double torque, int edges) {
   std::vector<Drawing> drawings{{curve, false}};
   grade(scene, drawings);
   Simulation sim;
-  runTo(sim, redraw(scene, drawings, {edges}), statics());
+  runTo(sim, remesh(scene, drawings, {edges}), statics());
   return sim.state.position.back();
 }
 
-TEST(Redraw, CouplesOnGradedEdgesGiveACleanSeries) {
+TEST(Remesh, CouplesOnGradedEdgesGiveACleanSeries) {
   for (const int edge : {1, 5, 8}) // a place of its own among the graded edges
     for (const double torque : {0.0, 0.2}) {
       const Vec3 couple = torque == 0 ? Vec3(0.05, 0.1, 0.2) : Vec3::Zero();
@@ -154,8 +154,8 @@ double prolongedError(int edges) {
   std::vector<Drawing> drawings{{curve, false}};
   grade(scene, drawings);
   Simulation a, b;
-  EXPECT_EQ(a.setUp(redraw(scene, drawings, {edges}), statics()), PetscErrorCode(0));
-  EXPECT_EQ(b.setUp(redraw(scene, drawings, {2 * edges}), statics()), PetscErrorCode(0));
+  EXPECT_EQ(a.setUp(remesh(scene, drawings, {edges}), statics()), PetscErrorCode(0));
+  EXPECT_EQ(b.setUp(remesh(scene, drawings, {2 * edges}), statics()), PetscErrorCode(0));
   const State state = prolonged(a.state, a.scene, *a.elements, b.scene, *b.elements);
   double worst = 0;
   for (std::size_t v = 0; v < state.position.size(); ++v)
@@ -176,7 +176,7 @@ TEST(Prolonged, TwistKeepsItsWholeTurns) {
     Scene scene = clampedScene(rod);
     scene.supports.push_back(hold(scene, 0, 8, Support::Kind::clamp));
     scene.supports.push_back(hold(scene, 0, 3, kind)); // half cells along the rod
-    const Scene fine = redraw(scene, {drawingOf(lineShape(Vec3::Zero(), Vec3::UnitX(), 8))}, {16});
+    const Scene fine = remesh(scene, {drawingOf(lineShape(Vec3::Zero(), Vec3::UnitX(), 8))}, {16});
     Simulation a, b;
     EXPECT_PETSC(a.setUp(scene, statics()));
     EXPECT_PETSC(b.setUp(fine, statics()));

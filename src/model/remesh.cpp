@@ -1,4 +1,4 @@
-#include "tendril/model/redraw.hpp"
+#include "tendril/model/remesh.hpp"
 
 #include "tendril/geometry/spline.hpp"
 
@@ -20,7 +20,7 @@ std::vector<double> lagrangeWeights(const std::vector<double> &nodes, double x) 
 
 int wrapped(int i, int n) { return ((i % n) + n) % n; }
 
-/// A director of the scene, or between two of them, on an edge of the redrawn rod. `place` counts the scene's edges
+/// A director of the scene, or between two of them, on an edge of the remeshed rod. `place` counts the scene's edges
 /// from the middle of the first.
 Vec3 directorBetween(const Rod &written, double place, const Vec3 &tangent) {
   const int n = written.edges();
@@ -38,11 +38,11 @@ Vec3 directorBetween(const Rod &written, double place, const Vec3 &tangent) {
 }
 
 /// Vertices stay as they are written where nothing asks for others.
-bool isRedrawn(const Rod &written, const Drawing &drawing, int edges) {
+bool isRemeshed(const Rod &written, const Drawing &drawing, int edges) {
   return drawing.grading || edges != written.edges();
 }
 
-Rod redrawn(const Rod &written, const Drawing &drawing, int edges) {
+Rod remeshed(const Rod &written, const Drawing &drawing, int edges) {
   if (edges < drawing.least_edges)
     throw SceneError("rod '" + written.name + "': its turns need at least " + shortText(drawing.least_edges) +
                      " edges, found " + std::to_string(edges));
@@ -274,19 +274,19 @@ int edgeMultiple(const Scene &scene, const Drawing &drawing, int r) {
   return n / common;
 }
 
-Scene redraw(const Scene &written, const std::vector<Drawing> &drawings, const std::vector<int> &edges) {
+Scene remesh(const Scene &written, const std::vector<Drawing> &drawings, const std::vector<int> &edges) {
   Scene scene;
   scene.gravity = written.gravity;
   scene.rotation = written.rotation;
   for (std::size_t r = 0; r < written.rods.size(); ++r)
-    scene.rods.push_back(isRedrawn(written.rods[r], drawings[r], edges[r])
-                             ? redrawn(written.rods[r], drawings[r], edges[r])
+    scene.rods.push_back(isRemeshed(written.rods[r], drawings[r], edges[r])
+                             ? remeshed(written.rods[r], drawings[r], edges[r])
                              : written.rods[r]);
   for (const Support &support : written.supports) {
     Support &s = scene.supports.emplace_back(support);
     const Rod &rod = scene.rods[s.rod];
     const Drawing &drawing = drawings[s.rod];
-    if (!isRedrawn(written.rods[s.rod], drawing, edges[s.rod])) continue;
+    if (!isRemeshed(written.rods[s.rod], drawing, edges[s.rod])) continue;
     s.vertex = movedVertex(written.rods[s.rod], drawing, support.vertex, edges[s.rod]);
     const Frame f = drawing.grading ? frameBetween(rod, s.vertex) : frameAtVertex(rod, s.vertex);
     if (!s.tangent_given) s.frame.tangent = f.tangent;
@@ -296,7 +296,7 @@ Scene redraw(const Scene &written, const std::vector<Drawing> &drawings, const s
   for (const Constraint &constraint : written.constraints) {
     Constraint &c = scene.constraints.emplace_back(constraint);
     const Rod &rod = scene.rods[c.rod], &before = written.rods[c.rod];
-    if (!isRedrawn(before, drawings[c.rod], edges[c.rod])) continue;
+    if (!isRemeshed(before, drawings[c.rod], edges[c.rod])) continue;
     c.at = c.isPin() ? movedVertex(before, drawings[c.rod], c.at, edges[c.rod])
                      : movedEdge(before, drawings[c.rod], c.at, edges[c.rod]);
     if (c.place_given) continue;

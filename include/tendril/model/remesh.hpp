@@ -1,5 +1,5 @@
 #pragma once
-/// \file redraw.hpp
+/// \file remesh.hpp
 /// The same scene with another number of edges: what is compared to estimate an error must be one problem, at two
 /// resolutions. Everything keeps its place up to terms that go with the square of the edge length, by the same law at
 /// every resolution, so that the error does too.
@@ -52,7 +52,7 @@ int edgeMultiple(const Scene &scene, const Drawing &drawing, int rod);
 ///   square of the edge length anew.
 /// \param edges per rod, multiples of edgeMultiple
 /// \throws SceneError naming the rod that cannot be drawn so
-Scene redraw(const Scene &scene, const std::vector<Drawing> &drawings, const std::vector<int> &edges);
+Scene remesh(const Scene &scene, const std::vector<Drawing> &drawings, const std::vector<int> &edges);
 
 /// `factor` times the edges of a scene.
 std::vector<int> edgesOf(const Scene &scene, int factor = 1);
