@@ -228,48 +228,45 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
 
 } // namespace
 
-int runMain(int count, char **arguments) {
-  // A word that belongs to no option is the scene, where none is given.
+namespace {
+
+/// A word that belongs to no option is the scene, where none is given.
+std::vector<char *> wordsOf(int count, char **arguments) {
   std::vector<char *> words(arguments, arguments + count);
-  if (std::none_of(words.begin(), words.end(), [](const char *word) { return std::string_view(word) == "-scene"; }))
-    for (std::size_t i = 1; i < words.size(); ++i)
-      if (words[i][0] != '-' && (i == 1 || words[i - 1][0] != '-')) {
-        static char option[] = "-scene";
-        words.insert(words.begin() + std::ptrdiff_t(i), option);
-        break;
-      }
-  int argc = int(words.size());
-  words.push_back(nullptr);
-  char **argv = words.data();
-  const auto begin = StopRequest::Clock::now();
-  const KeptSignals signals;
-  std::signal(SIGXFSZ, SIG_IGN); // a file that grows beyond its limit cannot be written: that is told
-  // Ours before PETSc's, which come only where solvers are set up for a scene.
-  auto given = [&](const char *option) {
-    return std::any_of(argv + 1, argv + argc, [&](const char *word) { return std::string_view(word) == option; });
-  };
-  try {
-    if (given("--version")) return print(versionText() + "\n"), 0;
-    if (given("-help") || given("-h") || given("--help")) {
-      print(helpText());
-      if (!given("-scene") && !given("-options_file")) return 0;
+  if (std::any_of(words.begin(), words.end(), [](const char *word) { return std::string_view(word) == "-scene"; }))
+    return words;
+  for (std::size_t i = 1; i < words.size(); ++i)
+    if (words[i][0] != '-' && (i == 1 || words[i - 1][0] != '-')) {
+      static char option[] = "-scene";
+      words.insert(words.begin() + std::ptrdiff_t(i), option);
+      break;
     }
-  } catch (const WriteError &e) {
-    std::fprintf(stderr, "tendril: %s\n", e.what());
-    return 3;
+  return words;
+}
+
+/// What is printed instead of a run: ours before PETSc's, which come only where solvers are set up for a scene.
+/// \return whether that is all
+bool printAsked(const std::vector<char *> &words) {
+  auto given = [&](const char *option) {
+    return std::any_of(words.begin() + 1, words.end(),
+                       [&](const char *word) { return std::string_view(word) == option; });
+  };
+  if (given("--version")) {
+    print(versionText() + "\n");
+    return true;
   }
-  OptionFiles files;
-  try {
-    files.read(argc, argv);
-  } catch (const SceneError &e) {
-    std::fprintf(stderr, "tendril: %s\n", printable(e.what()).c_str());
-    return 1;
-  }
-  if (const std::string mistake = initializePetsc(&argc, &argv); !mistake.empty()) {
-    std::fprintf(stderr, "tendril: %s\n", printable(files.locate("command line: " + mistake)).c_str());
-    return 1;
-  }
-  signals.restore();
+  if (!given("-help") && !given("-h") && !given("--help")) return false;
+  print(helpText());
+  return !given("-scene") && !given("-options_file");
+}
+
+int fail(const std::string &message, int exit_code) {
+  std::fprintf(stderr, "tendril: %s\n", printable(message).c_str());
+  return exit_code;
+}
+
+/// The run itself, between PetscInitialize and PetscFinalize. \return the exit code
+int runScene(int argc, char **argv, const OptionFiles &files, StopRequest::Clock::time_point begin) {
   int exit_code = 0;
   try {
     const QuietErrors errors;
@@ -286,13 +283,41 @@ int runMain(int count, char **arguments) {
     MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
     const std::string message =
         dynamic_cast<const std::bad_alloc *>(&e) ? "there is not enough memory for this scene" : files.locate(e.what());
-    if (rank == 0) std::fprintf(stderr, "tendril: %s\n", printable(message).c_str());
+    if (rank == 0) fail(message, 1);
     exit_code = 1;
     if (dynamic_cast<const WriteError *>(&e)) {
       std::fflush(nullptr);
       std::_Exit(3); // HDF5 tries a file again that it could not write, when MPI ends, and crashes there
     }
   }
+  return exit_code;
+}
+
+} // namespace
+
+int runMain(int count, char **arguments) {
+  std::vector<char *> words = wordsOf(count, arguments);
+  const auto begin = StopRequest::Clock::now();
+  const KeptSignals signals;
+  std::signal(SIGXFSZ, SIG_IGN); // a file that grows beyond its limit cannot be written: that is told
+  try {
+    if (printAsked(words)) return 0;
+  } catch (const WriteError &e) {
+    return fail(e.what(), 3);
+  }
+  int argc = int(words.size());
+  words.push_back(nullptr);
+  char **argv = words.data();
+  OptionFiles files;
+  try {
+    files.read(argc, argv);
+  } catch (const SceneError &e) {
+    return fail(e.what(), 1);
+  }
+  if (const std::string mistake = initializePetsc(&argc, &argv); !mistake.empty())
+    return fail(files.locate("command line: " + mistake), 1);
+  signals.restore();
+  const int exit_code = runScene(argc, argv, files, begin);
   (void)PetscOptionsSetValue(nullptr, "-options_left", "no"); // checked before the first step, with better words
   (void)PetscFinalize();
   return exit_code;

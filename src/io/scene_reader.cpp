@@ -156,14 +156,44 @@ struct Sums {
       defaults; ///< names of the blocks that take the same parameters by default
 };
 
+struct Copies {
+  int count = 1;
+  Vec3 offset = Vec3::Zero(); ///< from one to the next [m]
+};
+
+/// One of the rods of a block: a shape, moved. \param rod all but that, and `closed` as written
+void addRod(YamlMap &map, Rod rod, const Polyline &shape, const Vec3 &shift, double least_edges, SceneFile &out) {
+  const bool by_one_more_edge = rod.closed && !shape.closed; // to us such a curve is points
+  rod.position = shape.points;
+  rod.closed = shape.closed || rod.closed;
+  for (Vec3 &x : rod.position) x += shift;
+  try {
+    checkRod(rod);
+  } catch (const SceneError &e) {
+    map.value().fail(e.what());
+  }
+  readDirectors(map, rod);
+  if (rod.closed && rod.initial_turns != std::round(rod.initial_turns))
+    map.at("rods[].turns").fail("'turns' of a closed rod must be a whole number, or its ends do not meet");
+  if (rod.material.isCable() && rod.initial_turns != 0)
+    map.at("rods[].turns").fail("a rod without flexural stiffness has no twist");
+  Drawing &drawing = out.drawings.emplace_back();
+  drawing.directors_given = map.has("rods[].directors");
+  drawing.least_edges = least_edges;
+  if (shape.curve && !by_one_more_edge)
+    drawing.curve = [curve = shape.curve, shift](double s) { return Vec3(curve(s) + shift); };
+  out.names.add(rod.name);
+  out.scene.rods.push_back(std::move(rod));
+}
+
 void readRod(const YamlValue &value, const Overrides &overrides, SceneFile &out, Sums &sums) {
-  std::vector<Rod> &rods = out.scene.rods;
   YamlMap map(value, "rods");
   const std::string name = readName(map, out.names);
   double least_edges = 1;
   std::vector<Polyline> shapes = readShape(map, &least_edges);
   if (map.has("rods[].place")) place(map.at("rods[].place"), shapes);
   Rod common;
+  common.name = name;
   const MaterialRead material = readMaterial(map, overrides);
   common.material = material.material;
   if (!material.defaults.empty()) sums.defaults[material.defaults].push_back(name);
@@ -178,50 +208,26 @@ void readRod(const YamlValue &value, const Overrides &overrides, SceneFile &out,
   common.initial_velocity = map.vector("rods[].velocity");
   common.initial_turns = map.number("rods[].turns");
   readNatural(map, common);
-  const bool closed = map.flag("rods[].closed");
-  int copies = 1;
-  Vec3 offset = Vec3::Zero();
+  common.closed = map.flag("rods[].closed");
+  Copies copies;
   if (map.has("rods[].copies")) {
     YamlMap m(map.at("rods[].copies"), "rods[].copies");
-    copies = m.integer("rods[].copies.count");
-    offset = m.vector("rods[].copies.offset");
+    copies.count = m.integer("rods[].copies.count");
+    copies.offset = m.vector("rods[].copies.offset");
     m.finish();
   }
-  for (const Polyline &shape : shapes) sums.vertices += double(copies) * double(shape.points.size());
+  for (const Polyline &shape : shapes) sums.vertices += double(copies.count) * double(shape.points.size());
   if (sums.vertices > 1e8)
     value.fail("this makes " + std::to_string(std::int64_t(sums.vertices)) + " vertices; a scene may have 1e8");
   for (const Polyline &shape : shapes)
-    if (shape.closed && map.has("rods[].closed") && !closed)
+    if (shape.closed && map.has("rods[].closed") && !common.closed)
       map.at("rods[].closed").fail("'closed: false' contradicts the shape, which is closed");
-  for (int copy = 0; copy < copies; ++copy)
+  for (int copy = 0; copy < copies.count; ++copy)
     for (std::size_t k = 0; k < shapes.size(); ++k) {
       Rod rod = common;
-      rod.name = name;
       if (shapes.size() > 1) rod.name += "." + std::to_string(k);
-      if (copies > 1) rod.name += "#" + std::to_string(copy);
-      rod.position = shapes[k].points;
-      rod.closed = shapes[k].closed || closed;
-      for (Vec3 &x : rod.position) x += double(copy) * offset;
-      try {
-        checkRod(rod);
-      } catch (const SceneError &e) {
-        value.fail(e.what());
-      }
-      readDirectors(map, rod);
-      if (rod.closed && rod.initial_turns != std::round(rod.initial_turns))
-        map.at("rods[].turns").fail("'turns' of a closed rod must be a whole number, or its ends do not meet");
-      if (rod.material.isCable() && rod.initial_turns != 0)
-        map.at("rods[].turns").fail("a rod without flexural stiffness has no twist");
-      rods.push_back(rod);
-      out.names.add(rod.name);
-      Drawing &drawing = out.drawings.emplace_back();
-      drawing.directors_given = map.has("rods[].directors");
-      drawing.least_edges = least_edges;
-      if (rod.closed == shapes[k].closed &&
-          shapes[k].curve) // a curve that `closed` closes by one more edge is points to us
-        drawing.curve = [curve = shapes[k].curve, shift = Vec3(double(copy) * offset)](double s) {
-          return Vec3(curve(s) + shift);
-        };
+      if (copies.count > 1) rod.name += "#" + std::to_string(copy);
+      addRod(map, std::move(rod), shapes[k], Vec3(double(copy) * copies.offset), least_edges, out);
     }
   map.finish();
 }

@@ -73,7 +73,6 @@ PetscErrorCode registerSolvers() {
 PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &work, RodSet set) {
   KSP ksp;
   PC pc;
-  SNESLineSearch search;
   PetscFunctionBeginUser;
   potential_ = &potential;
   rods_ = set;
@@ -82,11 +81,44 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
   if (circulatory_.emplace(potential, set); circulatory_->isNone()) circulatory_.reset();
   system_ = {&dofs,        set,         &potential.blocks(), &work.metric,
              &work.active, &work.shift, &work.workspace,     potential.couplesPositions()};
-  const bool whole = set.begin == 0 && set.end == dofs.all().end;
+  PetscCall(createSnes());
+  PetscCall(SNESGetKSP(snes_, &ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  MatSolverType type = nullptr;
+  PetscBool cholesky;
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &cholesky));
+  PetscCall(PCFactorGetMatSolverType(pc, &type));
+  banded_ = cholesky && type && std::string(type) == "banded";
+  if (banded_) // factored straight from the band; every other solver gets a matrix of PETSc's own
+    PetscCall(createBandedMatrix(&system_, jacobian_.out()));
+  else
+    PetscCall(dofs.createMatrix(jacobian_.out()));
+  PetscCall(SNESSetJacobian(snes_, jacobian_, jacobian_, jacobianCallback, this));
+  if (type && std::string(type) == MATSOLVERMUMPS) PetscCall(askMumpsForInertia(pc, jacobian_));
+  if (!banded_ && (!cholesky || set.end - set.begin > 1)) {
+    PetscCall(createBandedMatrix(&system_, band_.out()));
+    PetscCall(KSPCreate(PETSC_COMM_SELF, inertia_.out()));
+    PetscCall(KSPSetType(inertia_, KSPPREONLY));
+    PetscCall(KSPGetPC(inertia_, &pc));
+    PetscCall(PCSetType(pc, PCCHOLESKY));
+    PetscCall(PCFactorSetMatSolverType(pc, "banded"));
+    PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGNATURAL));
+  }
+  PetscFunctionReturn(0);
+}
+
+/// SNES with its parts, our choice of each, then what options say.
+PetscErrorCode NewtonSolver::createSnes() {
+  KSP ksp;
+  PC pc;
+  SNESLineSearch search;
+  PetscFunctionBeginUser;
+  const DofMap &dofs = potential_->dofs();
+  const bool whole = rods_.begin == 0 && rods_.end == dofs.all().end;
   if (whole)
     PetscCall(DMCreateGlobalVector(dofs.dm(), x_.out()));
   else
-    PetscCall(VecCreateSeq(PETSC_COMM_SELF, dofs.unknowns(set), x_.out()));
+    PetscCall(VecCreateSeq(PETSC_COMM_SELF, dofs.unknowns(rods_), x_.out()));
   for (OwnedVec *v : {&f_, &right_, &solution_}) PetscCall(VecDuplicate(x_, v->out()));
   PetscCall(SNESCreate(whole ? PETSC_COMM_WORLD : PETSC_COMM_SELF, snes_.out()));
   if (whole) PetscCall(SNESSetDM(snes_, dofs.dm()));
@@ -109,26 +141,6 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
       pc, 1e-250)); // for PETSc's own: pivots have the units of a stiffness, no absolute bound makes sense
   PetscCall(SNESLineSearchSetPreCheck(search, directionCallback, this));
   PetscCall(SNESSetFromOptions(snes_));
-  MatSolverType type = nullptr;
-  PetscBool cholesky;
-  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &cholesky));
-  PetscCall(PCFactorGetMatSolverType(pc, &type));
-  banded_ = cholesky && type && std::string(type) == "banded";
-  if (banded_) // factored straight from the band; every other solver gets a matrix of PETSc's own
-    PetscCall(createBandedMatrix(&system_, jacobian_.out()));
-  else
-    PetscCall(dofs.createMatrix(jacobian_.out()));
-  PetscCall(SNESSetJacobian(snes_, jacobian_, jacobian_, jacobianCallback, this));
-  if (type && std::string(type) == MATSOLVERMUMPS) PetscCall(askMumpsForInertia(pc, jacobian_));
-  if (!banded_ && (!cholesky || set.end - set.begin > 1)) {
-    PetscCall(createBandedMatrix(&system_, band_.out()));
-    PetscCall(KSPCreate(PETSC_COMM_SELF, inertia_.out()));
-    PetscCall(KSPSetType(inertia_, KSPPREONLY));
-    PetscCall(KSPGetPC(inertia_, &pc));
-    PetscCall(PCSetType(pc, PCCHOLESKY));
-    PetscCall(PCFactorSetMatSolverType(pc, "banded"));
-    PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGNATURAL));
-  }
   PetscFunctionReturn(0);
 }
 

@@ -166,6 +166,7 @@ private:
     int rounds = 0;              ///< of a tolerance made sharper
     bool settled = false;        ///< what is left is little
   };
+  PetscErrorCode createSnes();
   void begin(const State &start, Seek seek, const Guess *guess, int patience);
   PetscErrorCode settle(Seek along, Outcome *now);
   PetscErrorCode settleNeutral(bool first, bool creeps, Seek seek, Outcome *now);
