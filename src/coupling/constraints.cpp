@@ -16,7 +16,7 @@ public:
   Spring(const Scene &scene, const Elements &elements, int k)
       : rod(scene.constraints[k].rod), slot(elements.rods[rod].slot(scene.constraints[k].at)),
         target(elements.constraint_slot[k]), constraint_(scene.constraints[k]), elements_(elements),
-        length_(restLengthOf(elements, rod)) {}
+        length_(elements.length(rod)) {}
 
   void begin(const Configuration &start, const Step &step) {
     weight_ = step.isStatic() || constraint_.damping == 0 ? 0 : constraint_.damping / step.dampingDt();

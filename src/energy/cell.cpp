@@ -16,7 +16,7 @@ std::vector<double> strainsOf(const Scene &scene, const Elements &elements, cons
   for (std::size_t n = 0; n < scene.constraints.size(); ++n) {
     const Constraint &constraint = scene.constraints[n];
     const int slot = elements.constraint_slot[n];
-    const Mat3 m = dampedStrain(elements, constraint, slot, restLengthOf(elements, constraint.rod), c);
+    const Mat3 m = dampedStrain(elements, constraint, slot, elements.length(constraint.rod), c);
     for (int j = 0; j < constraint.slots(); ++j)
       for (int k = 0; k < 3; ++k) strains[(k + 1) * row + slot + j] = m(k, j);
   }

@@ -85,16 +85,10 @@ Mat3 dampedStrain(const Elements &elements, const Constraint &constraint, int sl
   return m;
 }
 
-double restLengthOf(const Elements &elements, int rod) {
-  const RodRange &range = elements.rods[rod];
-  double length = 0;
-  for (int s = range.first_slot; s < range.edgeEnd(); ++s) length += elements.restLength()[s];
-  return length;
-}
-
 ConstraintReading readConstraint(const Scene &scene, const Elements &elements, int index, const State &state,
-                                 const Configuration &c) {
+                                 const Configuration &c, bool dynamic) {
   const Constraint &constraint = scene.constraints[index];
+  const double damping = dynamic ? constraint.damping : 0;
   const RodRange &rod = elements.rods[constraint.rod];
   const Vec3 g = deviation(elements, constraint, elements.constraint_slot[index], c);
   const Motion still, &motion = constraint.damps_motion ? constraint.motion : still;
@@ -102,7 +96,7 @@ ConstraintReading readConstraint(const Scene &scene, const Elements &elements, i
   if (constraint.isPin()) {
     out.distance = g;
     out.force = -distanceDerivatives(constraint, g).gradient -
-                constraint.damping * (state.velocity[rod.first_vertex + constraint.at] - motion.velocityAt(state.time));
+                damping * (state.velocity[rod.first_vertex + constraint.at] - motion.velocityAt(state.time));
     return out;
   }
   const int e = rod.first_edge + constraint.at;
@@ -111,8 +105,7 @@ ConstraintReading readConstraint(const Scene &scene, const Elements &elements, i
       f.tangent.cross(state.velocity[elements.vertex1[e]] - state.velocity[elements.vertex0[e]]) / f.length +
       f.tangent * state.twist_rate[e];
   out.rotation = g;
-  out.moment =
-      -rotationDerivatives(constraint, g).gradient - constraint.damping * (spin - motion.angularVelocityAt(state.time));
+  out.moment = -rotationDerivatives(constraint, g).gradient - damping * (spin - motion.angularVelocityAt(state.time));
   return out;
 }
 

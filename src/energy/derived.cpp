@@ -81,7 +81,7 @@ RodStrains rodStrains(const Scene &scene, const Elements &elements, const State 
 }
 
 RodActions rodActions(const Scene &scene, const Elements &elements, const State &state, double motion_time,
-                      double load_factor) {
+                      double load_factor, bool dynamic) {
   const Configuration c = configurationOf(state, scene, elements, motion_time);
   RodActions out;
   out.force.resize(state.director.size());
@@ -103,7 +103,7 @@ RodActions rodActions(const Scene &scene, const Elements &elements, const State 
     }
   }
   for (std::size_t k = 0; k < scene.constraints.size(); ++k)
-    out.constraint.push_back(readConstraint(scene, elements, int(k), state, c));
+    out.constraint.push_back(readConstraint(scene, elements, int(k), state, c, dynamic));
   // A couple acts by a pair of forces on the ends of its edge, which is not a force in the rod.
   for (const EdgeMoment &m : scene.moments) {
     const int i = elements.rods[m.rod].first_edge + m.edge;

@@ -22,7 +22,7 @@ double weightPotential(const Scene &scene, const Elements &elements, const Confi
 
 HolderActions staticActions(const Scene &scene, const Elements &elements, const State &state,
                             const std::vector<Holder> &moving) {
-  const RodActions actions = rodActions(scene, elements, state, state.time, state.time);
+  const RodActions actions = rodActions(scene, elements, state, state.time, state.time, false);
   HolderActions out;
   for (const Holder &h : moving)
     if (h.support)

@@ -14,6 +14,13 @@ double stiffestTurning(const Material &m) {
   return std::max({m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness});
 }
 
+std::string readName(const YamlValue &value) {
+  const std::string name = value.text();
+  if (name.empty() || name != inOneLine(name) || name.front() == ' ' || name.back() == ' ')
+    value.fail("'name' must be in one line, neither empty nor with blanks around it, found '" + inOneLine(name) + "'");
+  return name;
+}
+
 int closestVertex(const Rod &rod, const Vec3 &point) {
   auto away = [&](const Vec3 &x) { return (x - point).squaredNorm(); };
   return int(std::min_element(rod.position.begin(), rod.position.end(),
@@ -25,14 +32,16 @@ void readPin(YamlMap &map, const Rod &rod, const std::vector<Support> &supports,
   for (const AnyKey key : {AnyKey("constraints[].edge"), AnyKey("constraints[].tangent"),
                            AnyKey("constraints[].director"), AnyKey("constraints[].measure")})
     if (map.has(key)) map.at(key).fail("'" + std::string(key->name()) + "' is for 'type: rotation'");
-  c.place_given = map.has("constraints[].point");
+  c.point_given = map.has("constraints[].point");
   const bool closest = map.flag("constraints[].closest");
-  if (closest && !c.place_given) map.value().fail("'closest' needs the 'point' whose nearest vertex is meant");
+  if (closest && !c.point_given) map.value().fail("'closest' needs the 'point' whose nearest vertex is meant");
   if (closest && map.has("constraints[].vertex"))
     map.at("constraints[].vertex").fail("write 'vertex' or 'closest: true', not both");
-  if (c.place_given) c.point = map.at("constraints[].point").vector();
+  if (c.point_given) c.point = map.at("constraints[].point").vector();
+  if (!closest && !map.has("constraints[].vertex"))
+    map.value().fail("a pin needs a 'vertex', or a 'point' with 'closest: true'");
   c.at = closest ? closestVertex(rod, c.point) : readIndex(map, "constraints[].vertex", rod.vertices(), rod.name);
-  if (!c.place_given) c.point = rod.position[c.at];
+  if (!c.point_given) c.point = rod.position[c.at];
   for (const Support &s : supports)
     if (s.rod == c.rod && s.vertex == c.at && s.holdsPosition())
       map.value().fail("vertex " + std::to_string(c.at) + " of rod '" + rod.name +
@@ -48,13 +57,14 @@ void readRotation(YamlMap &map, const Rod &rod, Constraint &c) {
   c.at = readIndex(map, "constraints[].edge", rod.edges(), rod.name);
   const Frame drawn = referenceFrame(rod, c.at);
   c.frame = {drawn.tangent, drawn.director, 1};
-  c.place_given = map.has("constraints[].tangent") || map.has("constraints[].director");
-  if (map.has("constraints[].tangent")) {
+  c.tangent_given = map.has("constraints[].tangent");
+  c.director_given = map.has("constraints[].director");
+  if (c.tangent_given) {
     c.frame.tangent = unit(map.at("constraints[].tangent"));
     c.frame.director =
         orthonormalised(transport<double>(drawn.director, drawn.tangent, c.frame.tangent), c.frame.tangent);
   }
-  if (map.has("constraints[].director")) {
+  if (c.director_given) {
     const YamlValue d = map.at("constraints[].director");
     c.frame.director = unit(d);
     if (std::abs(c.frame.director.dot(c.frame.tangent)) > 1e-6)
@@ -82,11 +92,9 @@ void readConstraint(const YamlValue &value, SceneFile &out) {
   const std::string type = map.word("constraints[].type");
   map.word("constraints[].to");
   const std::vector<int> rods = readTargets(map, "constraints[].rod", out.names);
-  const std::string name = map.has("constraints[].name") ? map.at("constraints[].name").text()
-                                                         : "constraint" + std::to_string(scene.constraints.size());
-  if (name != inOneLine(name)) map.at("constraints[].name").fail("'name' must be in one line");
-  if (!out.constraint_names.insert(name).second)
-    value.fail("a constraint with the name '" + name + "' is there already");
+  const std::string name = map.has("constraints[].name") ? readName(map.at("constraints[].name"))
+                                                         : "constraint" + std::to_string(out.constraint_blocks);
+  ++out.constraint_blocks;
   bool told = false;
   const std::size_t before = scene.constraints.size();
   for (const int r : rods) {
@@ -94,10 +102,14 @@ void readConstraint(const YamlValue &value, SceneFile &out) {
     Constraint c{};
     c.kind = type == "pin" ? Constraint::Kind::pin : Constraint::Kind::rotation;
     c.name = rods.size() == 1 ? name : name + "#" + std::to_string(scene.constraints.size() - before);
+    if (!out.constraint_names.insert(c.name).second)
+      value.fail("a constraint with the name '" + c.name + "' is there already");
     c.rod = r;
-    if (!map.has("constraints[].stiffness"))
+    if (!map.has("constraints[].stiffness")) {
+      map.refuseUnknown();
       value.fail("'stiffness' is missing; to hold a " + std::string(c.isPin() ? "vertex" : "frame") +
                  " exactly, write a support of 'type: " + (c.isPin() ? "pin" : "clamp") + "'");
+    }
     c.stiffness = map.number("constraints[].stiffness");
     c.damping = map.number("constraints[].damping");
     c.saturation = map.number("constraints[].saturation");

@@ -16,7 +16,7 @@ void requireHeld(const Scene &scene) {
     const bool held = std::any_of(scene.supports.begin(), scene.supports.end(),
                                   [&](const Support &s) { return s.rod == int(r) && s.holdsPosition(); }) ||
                       std::any_of(scene.constraints.begin(), scene.constraints.end(),
-                                  [&](const Constraint &c) { return c.rod == int(r) && c.isPin(); });
+                                  [&](const Constraint &c) { return c.rod == int(r) && c.isPin() && c.stiffness > 0; });
     if (!held)
       throw SceneError(
           "rod '" + scene.rods[r].name +
@@ -59,6 +59,12 @@ PetscErrorCode prepare(Prepared &prepared, Options &o) {
     throw SceneError(
         "option -bifurcation: a scene with couples has no potential whose Hessian could tell stability; use off");
   if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength) requireDeadLoads(file.scene);
+  for (const Constraint &c : file.scene.constraints)
+    if (!c.isPin() && (o.accuracy || (o.error_estimate && !o.loop.dynamic)))
+      throw SceneError(
+          std::string("option ") + (o.accuracy ? "-accuracy" : "-error_estimate") + ": constraint '" + c.name +
+          "' turns an edge, whose middle moves when edges change: errors do not fall with the square of their "
+          "length; take a clamp, or compare runs with -rod_edges");
   if (o.accuracy && o.accuracy->of == Quantity::tip)
     for (const Rod &rod : file.scene.rods)
       if (rod.closed)

@@ -82,7 +82,8 @@ PetscErrorCode Recorder::end(bool stopped) {
   PetscFunctionBeginUser;
   if (stopped && trajectory_->lastTime() < run_.state.time) trajectory_->writeFrame(run_.state);
   PetscCall(PetscLogEventBegin(events().output, 0, 0, 0, 0));
-  const Summary at_end = summarize(run_.scene, *run_.elements, run_.state, options_.loop.dynamic ? 1 : run_.state.time);
+  const Summary at_end = summarize(run_.scene, *run_.elements, run_.state, options_.loop.dynamic ? 1 : run_.state.time,
+                                   options_.loop.dynamic);
   trajectory_->writeSummary(at_end);
   trajectory_->finish();
   if (!arclength_) writeCheckpoint(checkpoint_, run_, control_, facts_);

@@ -57,7 +57,8 @@ std::string textOf(const Constraint &c) {
 
 using Kind = RunFacts::Kind;
 constexpr const char *kinds[] = {"option", "load", "scene", "start"};
-constexpr const char *order_of_rods = "order of the rods", *names_of_rods = "names of the rods";
+constexpr const char *order_of_rods = "order of the rods", *names_of_rods = "names of the rods",
+                     *order_of_holders = "order of supports and constraints";
 
 } // namespace
 
@@ -97,7 +98,7 @@ int compareFacts(const FactValues &before, const FactValues &now, bool options, 
                       ": " + (added ? "none" : old->second) + " -> " + (gone ? "none" : present->second));
       continue;
     }
-    if (added && (key.second == order_of_rods || key.second == names_of_rods))
+    if (added && (key.second == order_of_rods || key.second == names_of_rods || key.second == order_of_holders))
       continue; // earlier versions did not keep it
     for (int k = 0; k < 3; ++k)
       if (key.first == kinds[k]) kind = std::max(kind, k);
@@ -188,9 +189,19 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
   auto at = [&](const char *what, int place, int rod) {
     return std::string(what) + std::to_string(place) + " of rod '" + scene.rods[rod].name + "'";
   };
-  for (const Support &s : scene.supports) add(Kind::scene, at("support at vertex ", s.vertex, s.rod), textOf(s));
-  for (const Constraint &c : scene.constraints)
+  Digest holders; // a state remembers what they did by their order
+  for (const Support &s : scene.supports) {
+    const int what[] = {int(s.kind), s.rod, s.vertex};
+    holders.add(what, sizeof what);
+    add(Kind::scene, at("support at vertex ", s.vertex, s.rod), textOf(s));
+  }
+  for (const Constraint &c : scene.constraints) {
+    const int what[] = {int(c.kind), c.rod, c.at};
+    holders.add(what, sizeof what);
+    holders.add(textOf(c));
     add(Kind::scene, at(c.isPin() ? "constraint at vertex " : "constraint at edge ", c.at, c.rod), textOf(c));
+  }
+  add(Kind::scene, order_of_holders, "#" + holders.hex());
   for (const NodalForce &f : scene.forces) add(Kind::load, at("force on vertex ", f.vertex, f.rod), textOf(f.force));
   for (const EdgeMoment &m : scene.moments) {
     if (m.torque != 0) add(Kind::load, at("torque on edge ", m.edge, m.rod), textOf(m.torque));

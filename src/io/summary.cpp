@@ -22,10 +22,10 @@ std::string textOf(const Vec3 &x, const char *unit) {
 
 } // namespace
 
-Summary summarize(const Scene &scene, const Elements &elements, const State &state, double load_factor) {
+Summary summarize(const Scene &scene, const Elements &elements, const State &state, double load_factor, bool dynamic) {
   Summary out;
   out.time = state.time;
-  const RodActions actions = rodActions(scene, elements, state, state.time, load_factor);
+  const RodActions actions = rodActions(scene, elements, state, state.time, load_factor, dynamic);
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
     const RodRange &rod = elements.rods[r];
     for (int i = 0; i < rod.vertices; ++i) {

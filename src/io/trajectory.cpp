@@ -161,7 +161,7 @@ void TrajectoryWriter::writeFrame(const State &state) {
   if (wanted(From::strains))
     snapshot.strains = rodStrains(scene_, elements_, state, state.time, dynamic_ ? 1 : state.time);
   if (wanted(From::actions))
-    snapshot.actions = rodActions(scene_, elements_, state, state.time, dynamic_ ? 1 : state.time);
+    snapshot.actions = rodActions(scene_, elements_, state, state.time, dynamic_ ? 1 : state.time, dynamic_);
   for (const ConstraintReading &c : snapshot.actions.constraint) {
     for (const Vec3 *x : {&c.distance, &c.rotation})
       snapshot.constraint_deviation.insert(snapshot.constraint_deviation.end(), x->data(), x->data() + 3);

@@ -263,15 +263,21 @@ YamlValue YamlMap::at(const Key &key) {
 }
 
 void YamlMap::finish() const {
+  refuseUnknown();
+  for (const auto &entry : value_.node())
+    if (const std::string name = entry.first.Scalar(); !asked_.count(name))
+      YamlValue(entry.first, value_.file(), name)
+          .fail("the key '" + name + "' has no meaning in this '" + value_.name() + "'; take it away");
+}
+
+void YamlMap::refuseUnknown() const {
   std::vector<std::string> allowed;
   for (const Key &key : keys)
     if (!key.isOption() && key.parent() == path_) allowed.emplace_back(key.name());
   for (const auto &entry : value_.node()) {
     const std::string name = entry.first.Scalar();
-    if (asked_.count(name)) continue;
+    if (std::find(allowed.begin(), allowed.end(), name) != allowed.end()) continue;
     const YamlValue key(entry.first, value_.file(), name);
-    if (std::find(allowed.begin(), allowed.end(), name) != allowed.end())
-      key.fail("the key '" + name + "' has no meaning in this '" + value_.name() + "'; take it away");
     const std::string near = closest(name, allowed);
     key.fail("unknown key '" + name + "' in '" + value_.name() + "'" +
              (near.empty() ? "" : "; did you mean '" + near + "'?") + " Allowed: " + join(allowed));

@@ -157,6 +157,7 @@ Elements::Elements(const Scene &scene, const DofMap &dofs)
       vertex_slot.push_back(range.slot(v));
       constants_[5][range.slot(v)] = dofs.isHeld(range.first_vertex + v) ? 0 : 1;
     }
+    length_.push_back(rod.length());
     for (int i = 0; i < range.edges; ++i) {
       const double length = rod.edge(i).norm();
       const int slot = range.slot(i);

@@ -22,12 +22,13 @@ bool same(const EdgeMoment &a, const EdgeMoment &b) {
 
 /// Places that are given by the scene stand in the world; others go with the rod.
 bool same(const Constraint &a, const Constraint &b) {
-  const bool same_place = a.isPin() ? !a.place_given && !b.place_given
+  const bool same_place = a.isPin() ? !a.point_given && !b.point_given
                                     : (a.frame.tangent - b.frame.tangent).norm() < rounding &&
                                           (a.frame.director - b.frame.director).norm() < rounding;
   return a.kind == b.kind && a.at == b.at && a.motion == b.motion && a.stiffness == b.stiffness &&
          a.damping == b.damping && a.saturation == b.saturation && a.measure == b.measure &&
-         a.damps_motion == b.damps_motion && a.place_given == b.place_given && same_place;
+         a.damps_motion == b.damps_motion && a.point_given == b.point_given && a.tangent_given == b.tangent_given &&
+         a.director_given == b.director_given && same_place;
 }
 
 bool sameShape(const Rod &a, const Drawing &drawing_a, const Rod &b, const Drawing &drawing_b) {

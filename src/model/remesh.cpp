@@ -299,9 +299,16 @@ Scene remesh(const Scene &written, const std::vector<Drawing> &drawings, const s
     if (!isRemeshed(before, drawings[c.rod], edges[c.rod])) continue;
     c.at = c.isPin() ? movedVertex(before, drawings[c.rod], c.at, edges[c.rod])
                      : movedEdge(before, drawings[c.rod], c.at, edges[c.rod]);
-    if (c.place_given) continue;
-    c.point = c.isPin() ? rod.position[c.at] : c.point;
-    c.frame = c.isPin() ? c.frame : referenceFrame(rod, c.at);
+    if (c.isPin()) {
+      if (!c.point_given) c.point = rod.position[c.at];
+      continue;
+    }
+    const Frame drawn = referenceFrame(rod, c.at);
+    if (!c.director_given) // goes with the edge, or with the tangent that is given
+      c.frame.director =
+          c.tangent_given ? transport<double>(drawn.director, drawn.tangent, c.frame.tangent) : drawn.director;
+    if (!c.tangent_given) c.frame.tangent = drawn.tangent;
+    c.frame.director = orthonormalised(c.frame.director, c.frame.tangent);
   }
   for (const NodalForce &f : written.forces)
     scene.forces.push_back({f.rod, movedVertex(written.rods[f.rod], drawings[f.rod], f.vertex, edges[f.rod]), f.force});

@@ -1,5 +1,6 @@
 #include "tendril/solver/hints.hpp"
 
+#include "tendril/energy/constraint.hpp"
 #include "tendril/solver/imbalance.hpp"
 
 #include <iomanip>
@@ -37,6 +38,15 @@ std::string nearBarrier(const IncrementalPotential &potential, RodSet rods) {
   if (turning.angle * degrees > near)
     hint += told(turning) + "folded by " + std::to_string(int(turning.angle * degrees)) +
             " degrees of at most 180: use more edges";
+  for (int r = rods.begin; r < rods.end; ++r)
+    for (const int k : e.constraintsOf(r)) {
+      const Constraint &constraint = potential.scene().constraints[k];
+      if (constraint.isPin() || constraint.measure == Constraint::Measure::sine) continue;
+      const double angle = deviation(e, constraint, e.constraint_slot[k], c).norm() * degrees;
+      if (angle > near)
+        hint += "; constraint '" + constraint.name + "' is turned by " + std::to_string(int(angle)) +
+                " degrees of at most 180 from its edge: make it stiffer, or take measure: sine";
+    }
   return hint;
 }
 

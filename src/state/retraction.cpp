@@ -141,18 +141,20 @@ static void moveAll(const RodRange &rod, const Vec3 &by, C &to) {
   }
 }
 
-/// A free rod keeps the mass-weighted mean of the additive update.
-[[gnu::flatten]] void Retraction::layFree(const C &from, const RodRange &rod, C &to) const {
-  const double *mass = elements_.mass();
+/// Lays a rod that nothing holds from the vertex at the slot `anchor` both ways, and moves it so that a weighted mean
+/// of the additive update is kept: by the masses, or where a pin draws that vertex by 1/softness, which counts it, too.
+[[gnu::flatten]] void Retraction::layFree(const C &from, const RodRange &rod, int anchor, bool pinned, C &to) const {
   Vec3 before = Vec3::Zero(), after = Vec3::Zero();
   double total = 0;
+  auto weight = [&](int s) { return pinned ? 1 / work_[softness][s] : elements_.mass()[s]; };
   auto mean = [&](Vec3 &sum) {
-    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) sum += mass[s] * to.displacementAt(s, from);
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) sum += weight(s) * to.displacementAt(s, from);
   };
   mean(before);
-  lay(rod.first_slot, rod.edgeEnd(), to);
+  lay(anchor, rod.first_slot, to);
+  lay(anchor, rod.edgeEnd(), to);
   mean(after);
-  for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) total += mass[s];
+  for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) total += weight(s);
   moveAll(rod, total > 0 ? Vec3((before - after) / total) : Vec3::Zero(), to);
 }
 
@@ -169,26 +171,27 @@ static void moveAll(const RodRange &rod, const Vec3 &by, C &to) {
       if (first < 0) first = s;
       last = s;
     }
-  const Elements::Pins &pins = elements_.pinsOf(r);
-  if (rod.closed || (first < 0 && !pins.empty())) {
+  if (rod.closed) {
     projectSpan(rod, begin, end, to);
     return true;
   }
-  if (first < 0) {
-    layFree(from, rod, to);
+  // From the first and the last vertex that is held or pinned, ends hang by chains; between are spans.
+  const Elements::Pins &pins = elements_.pinsOf(r);
+  int low = first, high = last;
+  if (!pins.empty()) {
+    low = first < 0 ? pins.front().first : std::min(first, pins.front().first);
+    high = std::max(last, pins.back().first);
+  }
+  if (first < 0 && low == high) {
+    layFree(from, rod, std::max(low, begin), low >= 0, to);
     return true;
   }
-  // Ends that hang from the first and the last of them, by chains; with pins they are spans, too.
-  const bool first_hangs = pins.empty() || pins.front().first > first,
-             last_hangs = pins.empty() || pins.back().first < last;
-  if (first_hangs) lay(first, begin, to);
-  if (last_hangs) lay(last, end, to);
+  lay(low, begin, to);
+  lay(high, end, to);
   moveAll(rod, Vec3::Zero(), to);
-  if (!first_hangs) projectSpan(rod, begin, first, to);
-  if (!last_hangs) projectSpan(rod, last, end, to);
-  for (int s = first; s < last;) {
+  for (int s = low; s < high;) {
     int next = s + 1;
-    while (freedom[next] != 0) ++next;
+    while (next < high && freedom[next] != 0) ++next;
     if (next > s + 1) projectSpan(rod, s, next, to);
     s = next;
   }

@@ -314,7 +314,7 @@ TEST(Constraints, AreOfSecondOrderWithTheEdges) {
   Frame f = referenceFrame(rod, 1);
   const Mat3 turn = Eigen::AngleAxisd(0.4, Vec3(0.3, 0.2, 0.9).normalized()).toRotationMatrix();
   Constraint turned = turnTo(0, 1, {turn * f.tangent, turn * f.director, 1}, 3);
-  turned.place_given = true;
+  turned.tangent_given = turned.director_given = true;
   written.constraints = {pinTo(written, 0, 0, Vec3::Zero(), 30), pinTo(written, 0, 5, Vec3::Zero(), 20), turned};
   std::vector<Vec3> ends;
   for (const int edges : {15, 45, 135, 405}) {
@@ -328,6 +328,64 @@ TEST(Constraints, AreOfSecondOrderWithTheEdges) {
   }
   EXPECT_GT((ends[0] - ends[1]).norm(), 1e-6);
   EXPECT_THROW(remesh(written, {Drawing{}}, {10}), SceneError);
+}
+
+/// A soft clamp, of a pin and a rotation at the first edge, is no harder to solve than a clamp, however stiff.
+TEST(Constraints, ClampSoftlyInAFewIterations) {
+  for (const double k : {0.5, 1e3, 1e6, 1e9})
+    for (const int edges : {20, 200}) {
+      Rod rod = straightRod(edges, Measure::tan);
+      rod.material.axial_stiffness = 4e4;
+      Scene s = clampedScene(rod);
+      s.supports.clear();
+      s.gravity = Vec3(0, -0.3, 0);
+      s.constraints = {pinTo(s, 0, 0, Vec3::Zero(), 2e3), turnTo(0, 0, referenceFrame(rod, 0), k)};
+      s.constraints[1].frame.length = 1;
+      Simulation sim;
+      int iterations = 0;
+      runTo(sim, s, statics(), &iterations);
+      EXPECT_LE(iterations, 5) << k << " " << edges;
+    }
+}
+
+/// Torques that turn an edge half a turn from its frame end the run, with every integrator: also with those whose steps
+/// end beyond their stages.
+TEST(Constraints, HaveABarrierAtHalfATurnWithEveryIntegrator) {
+  for (const std::string &name : integratorNames()) {
+    Rod rod = straightRod(4, Measure::angle);
+    rod.material = {0.1, 1e-6, 100, 5e-4, {5e-4, 5e-4}, 0, 0};
+    Scene s = clampedScene(rod);
+    s.supports = {hold(s, 0, 0, Support::Kind::pin), hold(s, 0, 4, Support::Kind::pin)};
+    s.constraints = {turnTo(0, 1, referenceFrame(rod, 1), 1e-4)};
+    s.constraints[0].frame.length = 1;
+    for (int e = 0; e < 4; ++e) s.moments.push_back({0, e, 2.5e-4, Vec3::Zero()});
+    LoopSettings settings = dynamics(0.01, 0.5);
+    settings.integrator.name = name;
+    Simulation sim;
+    EXPECT_PETSC(sim.setUp(s, settings));
+    TimeLoop loop(sim.solver, settings);
+    bool finished = true;
+    EXPECT_PETSC(loop.run(
+        sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+    EXPECT_FALSE(finished) << name;
+  }
+}
+
+/// In statics dampers do nothing, and what is read says so.
+TEST(Constraints, DampNothingInStatics) {
+  Rod rod = straightRod(10, Measure::angle);
+  Scene s = clampedScene(rod);
+  s.supports.clear();
+  s.gravity = Vec3(0, -1, 0);
+  s.constraints = {pinTo(s, 0, 0, Vec3::Zero(), 2e3), turnTo(0, 0, referenceFrame(rod, 0), 50)};
+  s.constraints[1].frame.length = 1;
+  for (Constraint &c : s.constraints) c.damping = 5;
+  s.constraints[0].motion.velocity = Vec3(0, 0.01, 0);
+  s.constraints[1].motion.angular_velocity = Vec3(0, 0, 0.1);
+  Simulation sim;
+  runTo(sim, s, statics());
+  const RodActions a = rodActions(sim.scene, *sim.elements, sim.state, 1, 1, false);
+  EXPECT_NEAR(a.constraint[0].force[1], 1, 1e-8); // the weight
 }
 
 } // namespace

@@ -6,6 +6,8 @@
 
 #include "tendril/energy/term.hpp"
 
+#include <algorithm>
+
 namespace tendril {
 
 /// Where a stencil acts: on a vertex (its position, 3 variables) or an edge (its vector and twist, 4 variables).
@@ -46,7 +48,7 @@ void addSite(const Local<n> &local, int first, int slot, const BlockPlanes *bloc
 /// and the class names the energy that it adds to.
 template <class Stencil, double EnergyBudget::*energy_name> class StencilTerm final : public Term {
 public:
-  /// \param stencils in any order
+  /// \param stencils those of a rod in the order of their targets
   StencilTerm(std::vector<Stencil> stencils, const Elements &elements)
       : elements_(elements), of_(elements.rods.size()) {
     for (Stencil &s : stencils) of_[s.rod].push_back(std::move(s));
@@ -82,8 +84,9 @@ public:
     }
   }
   std::array<Vec3, 2> actionFrom(int slot, const Configuration &c, int rod) const override {
-    for (const Stencil &s : of_[rod])
-      if (s.target == slot) return s.action(c);
+    const auto found = std::lower_bound(of_[rod].begin(), of_[rod].end(), slot,
+                                        [](const Stencil &s, int wanted) { return s.target < wanted; });
+    if (found != of_[rod].end() && found->target == slot) return found->action(c);
     return {Vec3::Zero(), Vec3::Zero()};
   }
 

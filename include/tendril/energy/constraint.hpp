@@ -45,9 +45,8 @@ Vec3 deviation(const Elements &elements, const Constraint &constraint, int slot,
 /// \param length of the rod at rest [m]
 Mat3 dampedStrain(const Elements &elements, const Constraint &constraint, int slot, double length,
                   const Configuration &c);
-double restLengthOf(const Elements &elements, int rod);
 
-/// What a constraint does at a state, its damper by the velocities there.
+/// What a constraint does at a state, in dynamics with its damper, by the velocities there.
 struct ConstraintReading {
   Vec3 distance = Vec3::Zero(), rotation = Vec3::Zero(); ///< from the target [m], [rad]
   Vec3 force = Vec3::Zero(), moment = Vec3::Zero();      ///< on the rod [N], [N m]
@@ -55,6 +54,6 @@ struct ConstraintReading {
 /// \param index of the constraint
 /// \param c of the state
 ConstraintReading readConstraint(const Scene &scene, const Elements &elements, int index, const State &state,
-                                 const Configuration &c);
+                                 const Configuration &c, bool dynamic);
 
 } // namespace tendril

@@ -36,8 +36,8 @@ struct RodActions {
 };
 /// With forces F and couples C, at an equilibrium and whatever the edge length: force(i) = force(i+1) + F(i+1) and
 /// moment(i) = moment(i+1) + e(i) x force(i) + C(i).
-/// \param load_factor on the loads of the scene
+/// \param load_factor on the loads of the scene \param dynamic whether dampers of constraints act
 RodActions rodActions(const Scene &scene, const Elements &elements, const State &state, double motion_time,
-                      double load_factor);
+                      double load_factor, bool dynamic = true);
 
 } // namespace tendril

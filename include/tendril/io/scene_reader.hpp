@@ -30,8 +30,9 @@ struct SceneFile {
   Scene scene;
   SceneSource source;
   RodNames names;
-  std::set<std::string> constraint_names; ///< of blocks
-  std::vector<Drawing> drawings;          ///< per rod
+  std::set<std::string> constraint_names;
+  int constraint_blocks = 0;
+  std::vector<Drawing> drawings; ///< per rod
   RunSettings run;
   std::vector<std::string> notes; ///< to be told at the start: defaults of materials, and warnings
 };

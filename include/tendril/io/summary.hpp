@@ -29,7 +29,7 @@ struct Summary {
 };
 
 /// \param load_factor on the loads of the scene
-Summary summarize(const Scene &scene, const Elements &elements, const State &state, double load_factor);
+Summary summarize(const Scene &scene, const Elements &elements, const State &state, double load_factor, bool dynamic);
 /// A few lines; supports one by one where they are few.
 std::vector<std::string> describe(const Summary &summary, const Scene &scene);
 /// Attributes of /summary, which has to be there. Before the end of a run they are those of no state, nan and -1: a

@@ -69,6 +69,8 @@ public:
   std::array<double, 2> pair(KeyOf<KeyType::pair> key) { return at(*key).pair(*key); }
   /// Call when all has been read.
   void finish() const;
+  /// A key that is not in the table, before anything that is missing for it is told.
+  void refuseUnknown() const;
   const YamlValue &value() const { return value_; }
 
   bool has(const Key &key);

@@ -63,6 +63,7 @@ public:
     return constraints_.empty() ? std::span<const int>() : std::span<const int>(constraints_[rod]);
   }
   const Pins &pinsOf(int rod) const { return pins_.empty() ? no_pins_ : pins_[rod]; }
+  double length(int rod) const { return length_[rod]; } ///< at rest [m]
   int vertices() const { return int(vertex_slot.size()); }
   int edges() const { return int(edge_slot.size()); }
 
@@ -70,6 +71,7 @@ public:
 
 private:
   Planes constants_, cells_;
+  std::vector<double> length_;                ///< per rod
   std::vector<std::vector<int>> constraints_; ///< per rod
   std::vector<Pins> pins_;                    ///< per rod
   Pins no_pins_;

@@ -107,7 +107,7 @@ struct Constraint {
   double saturation = -1;           ///< [m] or [rad]; none where negative
   Measure measure = Measure::angle; ///< of a rotation
   bool damps_motion = true;         ///< whether the damper moves with the point or frame, or stands still
-  bool place_given = false;         ///< the point or frame by the scene, otherwise that of the rod as drawn
+  bool point_given = false, tangent_given = false, director_given = false; ///< by the scene, otherwise as drawn
 
   bool isPin() const { return kind == Kind::pin; }
   /// What rows of a trajectory and the rods' own memory need room for, in slots.

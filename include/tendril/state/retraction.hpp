@@ -36,7 +36,7 @@ private:
   void stiffenNearHeld(const RodRange &rod, const Elements::Pins &pins);
   bool aim(const Configuration &from, const RodRange &rod, RetractionKind kind, const Configuration &to);
   void lay(int begin, int end, Configuration &to) const;
-  void layFree(const Configuration &from, const RodRange &rod, Configuration &to) const;
+  void layFree(const Configuration &from, const RodRange &rod, int anchor, bool pinned, Configuration &to) const;
   bool restoreLengths(const Configuration &from, int rod, RetractionKind kind, Configuration &to);
   void projectSpan(const RodRange &rod, int first, int last, Configuration &to);
   bool updateFrames(const Configuration &from, const Planes &increment, double scale, int rod, Configuration &to) const;
