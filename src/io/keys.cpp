@@ -126,7 +126,12 @@ std::string rulesOf(std::string_view block) {
   if (block == "supports[]")
     return R"("if": {"properties": {"type": {"const": "pin"}}},
  "then": {"not": {"anyOf": [{"required": ["tangent"]}, {"required": ["director"]}]}})";
-  if (block == "supports[].motion")
+  if (block == "constraints[]")
+    return R"("if": {"properties": {"type": {"const": "pin"}}},
+ "then": {"oneOf": [{"required": ["vertex"], "properties": {"closest": {"const": false}}}, {"required": ["closest", "point"], "properties": {"closest": {"const": true}}}],
+  "not": {"anyOf": [{"required": ["edge"]}, {"required": ["tangent"]}, {"required": ["director"]}, {"required": ["measure"]}]}},
+ "else": {"required": ["edge"], "not": {"anyOf": [{"required": ["vertex"]}, {"required": ["closest"]}, {"required": ["point"]}]}})";
+  if (block == "supports[].motion" || block == "constraints[].motion")
     return R"("oneOf": [{"required": ["table"]}, {"anyOf": [{"required": ["velocity"]}, {"required": ["angular_velocity"]}]}])";
   if (block == "loads[]")
     return R"("oneOf": [
