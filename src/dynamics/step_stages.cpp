@@ -27,7 +27,7 @@ PetscErrorCode TimeLoop::solveStages(const State &start, State *next, Attempt *n
     const bool is_end = integrator_->endsAtStage() && int(stages_.size()) >= integrator_->stages(start);
     solver_.on_block = [&](RodSet rods) {
       potential.stageRates(rods, rates);
-      noteActions(start, rods);
+      noteActions(rods);
       if (!is_end) return;
       finish(start, h, rods, next);
       now->commit(potential, rods, next);
@@ -81,10 +81,10 @@ void TimeLoop::finish(const State &start, double h, RodSet rods, State *next) {
 }
 
 /// What moving supports and constraints of some rods do at the stage just solved.
-void TimeLoop::noteActions(const State &start, RodSet rods) {
+void TimeLoop::noteActions(RodSet rods) {
   for (int r = rods.begin; r < rods.end && !moving_.empty(); ++r)
     for (const int k : moving_of_[r]) {
-      const std::array<Vec3, 2> action = solver_.potential().actionOf(moving_[k], start);
+      const std::array<Vec3, 2> action = solver_.potential().actionOf(moving_[k]);
       std::copy(action.begin(), action.end(), actions_.back().begin() + 2 * k);
     }
 }

@@ -246,62 +246,107 @@ void writeCheckpoint(const std::string &path, const Simulation &run, const StepC
   if (error) throw WriteError(path + ": cannot be written");
 }
 
+namespace {
+
+/// What a checkpoint has, and how the run that wrote it was other than this one.
+struct Found {
+  Contents contents;
+  std::vector<std::string> lines; ///< to be told
+  bool switches = false;          ///< between statics and dynamics
+  bool same_dt = true, same_method = true;
+  int other = 0; ///< the furthest kind of change (RunFacts::Kind)
+};
+
+/// \throws OtherRun where the file is of no use to this run
+void readWithFacts(const std::string &path, const Hdf5File &file, const Simulation &run, const RunFacts &facts,
+                   Found *f) {
+  const Elements &elements = *run.elements;
+  CheckpointReader in(path, file);
+  std::string read, mode, integrator, scene_hash, topology_hash, text;
+  in.text("format", read);
+  if (read != checkpoint_format) in.fail("is no checkpoint");
+  in.format_version = in.count("format_version", 1e9);
+  if (in.format_version < 2 || in.format_version > checkpoint_version)
+    throw OtherRun(path + ": is of format " + std::to_string(in.format_version) +
+                   ", and this version reads formats 1 to " + std::to_string(checkpoint_version) +
+                   "; take a newer one");
+  in.text("mode", mode);
+  in.text("integrator", integrator);
+  double dt;
+  in.number("dt", dt);
+  in.text("topology_hash", topology_hash);
+  in.text("scene_hash", scene_hash);
+  const std::size_t rods = in.count("rods", 1e12), vertices = in.count("vertices", 1e12),
+                    edges = in.count("edges", 1e12);
+  if (topology_hash != facts.topology_hash || vertices != std::size_t(elements.vertices()) ||
+      edges != std::size_t(elements.edges()))
+    throw OtherRun(path + ": is of another topology, " + std::to_string(rods) + " rods with " +
+                   std::to_string(vertices) + " vertices and " + std::to_string(edges) + " edges, and the scene has " +
+                   std::to_string(run.scene.rods.size()) + " with " + std::to_string(elements.vertices()) + " and " +
+                   std::to_string(elements.edges()) +
+                   "; restart with the scene that wrote the checkpoint, or one that only changes loads, supports, "
+                   "materials and options");
+  in.longText("facts", text);
+  exchange(in, f->contents, elements);
+  if (!in.finish()) f->lines.push_back(path + ": has no checksum: its data are taken as they are");
+  f->switches = mode != (facts.dynamic ? "dynamic" : "static");
+  const FactValues old = factsOf(text), now = factsOf(textOf(facts.facts));
+  if (areInAnotherOrder(old, now))
+    throw OtherRun(path +
+                   ": has the same rods in another order; write them in the scene in the order of the checkpoint");
+  const std::pair<std::string, std::string> adapt{"option", "dt_adapt"};
+  f->same_dt =
+      dt == facts.dt && old.count(adapt) == now.count(adapt) && (!now.count(adapt) || old.at(adapt) == now.at(adapt));
+  f->same_method = integrator == facts.integrator && f->contents.strain_row == strainRow(elements);
+  const std::size_t before = f->lines.size();
+  f->other = compareFacts(old, now, !f->switches, &f->lines);
+  if (scene_hash != facts.scene_hash && f->lines.size() == before)
+    f->lines.push_back("the text of the scene has changed since the checkpoint, but not what it says");
+}
+
+/// What the found state needs to go on in this run.
+void adapt(Found *f, const std::vector<double> &places, const Simulation &run, const RunFacts &facts) {
+  State &s = f->contents.state;
+  StepControl &control = f->contents.control;
+  const std::vector<double> &cells = f->contents.cells;
+  const bool other_cells = !cells.empty() && cells != places;
+  if (cells.empty() && s.winding.size() != places.size()) s.winding.assign(places.size(), 0.0);
+  if (!f->same_method) {
+    s.memory.clear();
+    s.strains.clear();
+    s.support_actions.clear();
+    s.last_dt = s.dt_before = 0;
+  }
+  if (f->switches) {
+    s.time = 0;
+    s.step = 0;
+    std::fill(s.velocity.begin(), s.velocity.end(), Vec3::Zero());
+    std::fill(s.twist_rate.begin(), s.twist_rate.end(), 0.0);
+    control = {};
+    f->lines.push_back(facts.dynamic ? "the state of statics is the start of dynamics: at rest, at time 0"
+                                     : "the state of dynamics is the start of statics, with the load factor from 0");
+  }
+  if (!f->same_dt) control.dt = 0; // what is asked for now
+  if (other_cells) carryTurns(run, f->contents, places, &s);
+  if (f->other != int(RunFacts::Kind::scene) && !other_cells && !f->switches) return;
+  beginAnew(run, &s, &f->lines);
+  control.energy = NAN;
+  tellJumps(run, s, &f->lines);
+}
+
+} // namespace
+
 bool readCheckpoint(const std::string &path, Simulation *run, StepControl *control, const RunFacts &facts,
                     std::vector<std::string> *told) {
-  const Elements &elements = *run->elements;
-  Contents c;
-  std::vector<std::string> lines;
-  bool switches = false, same_dt = true, same_method = true;
-  int other = 0;
-  const std::vector<double> places = cellPlaces(elements);
+  Found f;
   try {
     const Hdf5File file = Hdf5File::open(path);
-    if (!file.text("format") && file.has("loop")) {
-      readArrays1(path, file, elements, facts.integrator, &c);
-      lines.push_back(path + ": is of an earlier version, without checksum and without the scene it is of: that of "
-                             "this run has to be the same");
+    if (file.text("format") || !file.has("loop")) {
+      readWithFacts(path, file, *run, facts, &f);
     } else {
-      CheckpointReader in(path, file);
-      std::string read, mode, integrator, scene_hash, topology_hash, text;
-      in.text("format", read);
-      if (read != checkpoint_format) in.fail("is no checkpoint");
-      in.format_version = in.count("format_version", 1e9);
-      if (in.format_version < 2 || in.format_version > checkpoint_version)
-        throw OtherRun(path + ": is of format " + std::to_string(in.format_version) +
-                       ", and this version reads formats 1 to " + std::to_string(checkpoint_version) +
-                       "; take a newer one");
-      in.text("mode", mode);
-      in.text("integrator", integrator);
-      double dt;
-      in.number("dt", dt);
-      in.text("topology_hash", topology_hash);
-      in.text("scene_hash", scene_hash);
-      const std::size_t rods = in.count("rods", 1e12), vertices = in.count("vertices", 1e12),
-                        edges = in.count("edges", 1e12);
-      if (topology_hash != facts.topology_hash || vertices != std::size_t(elements.vertices()) ||
-          edges != std::size_t(elements.edges()))
-        throw OtherRun(path + ": is of another topology, " + std::to_string(rods) + " rods with " +
-                       std::to_string(vertices) + " vertices and " + std::to_string(edges) +
-                       " edges, and the scene has " + std::to_string(run->scene.rods.size()) + " with " +
-                       std::to_string(elements.vertices()) + " and " + std::to_string(elements.edges()) +
-                       "; restart with the scene that wrote the checkpoint, or one that only changes loads, supports, "
-                       "materials and options");
-      in.longText("facts", text);
-      exchange(in, c, elements);
-      if (!in.finish()) lines.push_back(path + ": has no checksum: its data are taken as they are");
-      switches = mode != (facts.dynamic ? "dynamic" : "static");
-      const FactValues old = factsOf(text), now = factsOf(textOf(facts.facts));
-      if (areInAnotherOrder(old, now))
-        throw OtherRun(path +
-                       ": has the same rods in another order; write them in the scene in the order of the checkpoint");
-      const std::pair<std::string, std::string> adapt{"option", "dt_adapt"};
-      same_dt = dt == facts.dt && old.count(adapt) == now.count(adapt) &&
-                (!now.count(adapt) || old.at(adapt) == now.at(adapt));
-      same_method = integrator == facts.integrator && c.strain_row == strainRow(elements);
-      const std::size_t before = lines.size();
-      other = compareFacts(old, now, !switches, &lines);
-      if (scene_hash != facts.scene_hash && lines.size() == before)
-        lines.push_back("the text of the scene has changed since the checkpoint, but not what it says");
+      readArrays1(path, file, *run->elements, facts.integrator, &f.contents);
+      f.lines.push_back(path + ": is of an earlier version, without checksum and without the scene it is of: that of "
+                               "this run has to be the same");
     }
   } catch (const DamagedCheckpoint &) {
     throw;
@@ -310,37 +355,14 @@ bool readCheckpoint(const std::string &path, Simulation *run, StepControl *contr
   } catch (const SceneError &e) {
     throw DamagedCheckpoint(e.what());
   }
+  const Contents &c = f.contents;
   if (!std::isfinite(c.state.time) || !(c.state.time >= 0) || !std::isfinite(c.control.dt))
     throw DamagedCheckpoint(path + ": its time or step is no number");
-  State &s = c.state;
-  const bool other_cells = !c.cells.empty() && c.cells != places;
-  if (c.cells.empty() && s.winding.size() != places.size()) s.winding.assign(places.size(), 0.0);
-  if (!same_method) {
-    s.memory.clear();
-    s.strains.clear();
-    s.support_actions.clear();
-    s.last_dt = s.dt_before = 0;
-  }
-  if (switches) {
-    s.time = 0;
-    s.step = 0;
-    std::fill(s.velocity.begin(), s.velocity.end(), Vec3::Zero());
-    std::fill(s.twist_rate.begin(), s.twist_rate.end(), 0.0);
-    c.control = {};
-    lines.push_back(facts.dynamic ? "the state of statics is the start of dynamics: at rest, at time 0"
-                                  : "the state of dynamics is the start of statics, with the load factor from 0");
-  }
-  if (!same_dt) c.control.dt = 0; // what is asked for now
-  if (other_cells) carryTurns(*run, c, places, &s);
-  if (other == int(RunFacts::Kind::scene) || other_cells || switches) {
-    beginAnew(*run, &s, &lines);
-    c.control.energy = NAN;
-    tellJumps(*run, s, &lines);
-  }
-  run->state = std::move(s);
-  *control = c.control;
-  told->insert(told->end(), lines.begin(), lines.end());
-  return other > 0 || switches;
+  adapt(&f, cellPlaces(*run->elements), *run, facts);
+  run->state = std::move(f.contents.state);
+  *control = f.contents.control;
+  told->insert(told->end(), f.lines.begin(), f.lines.end());
+  return f.other > 0 || f.switches;
 }
 
 } // namespace tendril

@@ -140,9 +140,9 @@ void IncrementalPotential::focus(RodSet rods) {
   if (rods.begin == focus_.begin && rods.end == focus_.end) return;
   std::fill(known_.begin() + focus_.begin, known_.begin() + focus_.end, Known::nothing);
   focus_ = rods;
-  if (dofs_.slots(rods) > room_) {
-    room_ = dofs_.slots(rods);
-    derivatives_ = Derivatives(room_);
+  if (dofs_.slots(rods) > workspace_slots_) {
+    workspace_slots_ = dofs_.slots(rods);
+    derivatives_ = Derivatives(workspace_slots_);
   }
   derivatives_.setOrigin(elements_.rods[rods.begin].first_slot);
 }
@@ -280,7 +280,7 @@ void IncrementalPotential::commit(State &state) const {
   ++state.step;
 }
 
-std::array<Vec3, 2> IncrementalPotential::actionOf(const Holder &holder, const State &start) {
+std::array<Vec3, 2> IncrementalPotential::actionOf(const Holder &holder) {
   std::array<Vec3, 2> action{Vec3::Zero(), Vec3::Zero()};
   const int slot = holder.support ? elements_.support_slot[holder.index] : elements_.constraint_slot[holder.index];
   for (const auto &term : terms_) {

@@ -210,9 +210,9 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
     };
     bool settled = false; // what more iterations would not change
     for (int start = 0; start < 2 && !done && (start == 0 || settled || definite); ++start) {
-      Planes room(slot_size, dofs.slots(rods_));
-      room.setOrigin(dofs.rods()[rods_.begin].first_slot);
-      Probe w{room, room, room}, x = w, p = w;
+      Planes workspace(slot_size, dofs.slots(rods_));
+      workspace.setOrigin(dofs.rods()[rods_.begin].first_slot);
+      Probe w{workspace, workspace, workspace}, x = w, p = w;
       beginMode(start);
       soften(work_->increment, x.soft);
       std::vector<double> before(neutral->size(), HUGE_VAL);

@@ -108,7 +108,7 @@ private:
   bool adapts() const { return settings_.dynamic && settings_.adapt == Adaptation::error; }
   PetscErrorCode solveStages(const State &start, State *next, Attempt *now);
   StepError stepError(const State &start, double h) const;
-  void noteActions(const State &start, RodSet rods);
+  void noteActions(RodSet rods);
   void finish(const State &start, double h, RodSet rods, State *next);
   Work dynamicWork(const State &start, double h) const;
   double movedKinetic(const State &state) const;

@@ -133,8 +133,7 @@ public:
   }
   /// Force [N] and moment [N m] of a support or constraint on its rod at the iterate, without the inertia of a held
   /// vertex itself.
-  /// \param start of the step
-  std::array<Vec3, 2> actionOf(const Holder &holder, const State &start);
+  std::array<Vec3, 2> actionOf(const Holder &holder);
   const Configuration &start() const { return start_; }
   double length(int rod) const { return scales_[rod].length; }              ///< at rest [m]
   double shortestEdge(int rod) const { return scales_[rod].shortest_edge; } ///< at rest [m]
@@ -167,7 +166,7 @@ private:
   const Configuration &twistReference() const { return step_.twist_reference ? *step_.twist_reference : start_; }
   Derivatives derivatives_{0};
   RodSet focus_{0, 0};
-  int room_ = 0; ///< slots
+  int workspace_slots_ = 0; ///< slots
   enum class Known : char { nothing, gradient, all };
   std::vector<Known> known_; ///< per rod: what derivatives_ holds of the iterate
   std::vector<RodScale> scales_;
