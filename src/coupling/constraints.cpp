@@ -27,6 +27,8 @@ public:
         rest_(a, j) = dampedRest(step, strain(a, j), (a + 1) * strainRow(elements_) + target + j);
   }
 
+  double stored(const Configuration &c) const { return radialLaw(constraint_, deviationOf(c).norm()).value; }
+
 protected:
   const Constraint &constraint_;
   const Elements &elements_;
@@ -49,7 +51,6 @@ public:
   using Spring::Spring;
 
   void moveIterate(const Configuration &) {}
-  double stored(const Configuration &c) const { return radialLaw(constraint_, deviationOf(c).norm()).value; }
   double value(const Configuration &c) const {
     return stored(c) + (weight_ > 0 ? 0.5 * weight_ * movedSinceRest(c).squaredNorm() : 0);
   }
@@ -86,7 +87,6 @@ public:
     moveIterate(start);
   }
   void moveIterate(const Configuration &iterate) { iterate_ = deviationOf(iterate); }
-  double stored(const Configuration &c) const { return radialLaw(constraint_, deviationOf(c).norm()).value; }
   double value(const Configuration &c) const {
     const Vec3 g = deviationOf(c);
     if (constraint_.measure == Constraint::Measure::angle && jumpsBetween(iterate_, g))

@@ -2,8 +2,6 @@
 
 namespace tendril {
 
-using C = Configuration;
-
 namespace {
 
 /// x/2 cot(x/2).
