@@ -239,9 +239,7 @@ PetscErrorCode ArcLength::switchBranch(const CriticalPoint &critical, double len
 
 EnergyBudget ArcLength::energyOf(const State &at) const {
   const IncrementalPotential &potential = solver_.potential();
-  EnergyBudget budget;
-  for (int r = 0; r < potential.all().end; ++r) budget += potential.energyBudget(at, potential.iterate(), at.time, r);
-  return budget;
+  return potential.energyBudget(at, potential.iterate(), at.time, potential.all());
 }
 
 /// Solves the next step, and judges whether its end is the path's; `obstacle_` says what is wrong with it.

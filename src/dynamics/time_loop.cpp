@@ -80,8 +80,7 @@ PetscErrorCode TimeLoop::attempt(const State &state, State *next, Attempt *now) 
 
 void TimeLoop::Attempt::commit(const IncrementalPotential &potential, RodSet rods, State *next) {
   potential.commitConfiguration(*next, rods);
-  for (int r = rods.begin; r < rods.end; ++r)
-    energy += potential.energyBudget(*next, potential.iterate(), step.load_factor, r);
+  energy += potential.energyBudget(*next, potential.iterate(), step.load_factor, rods);
 }
 
 /// Whether a critical point may lie within the step. Couples have no potential: the inertia of the symmetric part says
@@ -164,10 +163,7 @@ void TimeLoop::prepare(const State &state) {
   const bool goes_on = !std::isnan(control.energy) && (settings_.dynamic || state.time > 0);
   if (!goes_on) {
     const Configuration start = configurationOf(state, scene, potential.elements(), state.time);
-    EnergyBudget energy;
-    for (int r = 0; r < potential.all().end; ++r)
-      energy += potential.energyBudget(state, start, settings_.dynamic ? 1 : state.time, r);
-    control.energy = energy.total();
+    control.energy = potential.energyBudget(state, start, settings_.dynamic ? 1 : state.time, potential.all()).total();
   }
   moving_ = movingHolders(scene);
   moving_of_.assign(moving_.empty() ? 0 : scene.rods.size(), {});

@@ -106,9 +106,13 @@ IncrementalPotential::RodEnergy IncrementalPotential::rodEnergy(const Configurat
 }
 
 EnergyBudget IncrementalPotential::energyBudget(const State &state, const Configuration &c, double load_factor,
-                                                int r) const {
+                                                RodSet rods) const {
   EnergyBudget budget;
-  for (const auto &term : terms_) term->addEnergies(state, c, load_factor, r, budget);
+  for (int r = rods.begin; r < rods.end; ++r) {
+    EnergyBudget of_rod;
+    for (const auto &term : terms_) term->addEnergies(state, c, load_factor, r, of_rod);
+    budget += of_rod;
+  }
   return budget;
 }
 

@@ -66,8 +66,8 @@ public:
     double reach = 0, steepness = 1; ///< largest coordinate [m]; how much stiffer than at rest the steepest cell is
   };
   RodEnergy rodEnergy(const Configuration &configuration, int rod) const;
-  /// What a state of a rod stores, term by term. \param configuration that of the state
-  EnergyBudget energyBudget(const State &state, const Configuration &configuration, double load_factor, int rod) const;
+  /// What a state of some rods stores, term by term. \param configuration that of the state
+  EnergyBudget energyBudget(const State &state, const Configuration &configuration, double load_factor, RodSet rods) const;
   double energy(const Configuration &configuration, RodSet rods) const;
   double energy(const Configuration &configuration) const { return energy(configuration, all()); }
   /// Room for the derivatives of some rods; those of others are forgotten. Derivatives of other rods need room for all.
