@@ -176,14 +176,14 @@ static PetscErrorCode bisect(const Follow &follow, BranchPoint *low, BranchPoint
 }
 
 PetscErrorCode locateCritical(StepSolver &solver, const Step &step, const Follow &follow, BranchPoint low, double high,
-                              double scale, CriticalPoint *point, bool *found) {
+                              double scale, double known, CriticalPoint *point, bool *found) {
   constexpr int most_rounds = 12;
   constexpr double interval = 1e-9, agreement = 1e-7,
                    part = 1e-3; // of the scale, of the load factor, of the first interval
   PetscFunctionBeginUser;
   *found = false;
   const Doing here([](std::ostream &out) { out << "a critical load is searched for"; });
-  const double start = low.parameter, end = high, width = end - start, aside = std::max(part * width, 1e-5 * scale);
+  const double end = high, width = end - low.parameter, aside = std::max(part * width, 1e-5 * scale);
   double last = std::nan(""); // what the round before found
   bool ahead = false;         // whether the branch was found beyond
   BranchPoint before, beyond;
@@ -198,7 +198,7 @@ PetscErrorCode locateCritical(StepSolver &solver, const Step &step, const Follow
     };
     PetscCall(bisect(follow, &low, &base, high, interval * scale, aside, width));
     if (std::abs(low.state.time - last) <= agreement * std::abs(last)) {
-      if (low.parameter > start)
+      if (low.parameter > known + agreement * std::abs(known))
         PetscCall(softens(solver, step, before, low, 3 * std::sqrt(interval * scale / aside),
                           found)); // the root is that of limit points
       if (!*found && !ahead) break;

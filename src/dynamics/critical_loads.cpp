@@ -5,7 +5,8 @@
 
 namespace tendril {
 
-/// Whether to look behind a critical point for more. It costs some solves of the step.
+/// Whether to look also where Newton only met indefinite Hessians, and behind a critical point for more. It costs some
+/// solves of the step.
 bool TimeLoop::isThorough() const {
   return settings_.bifurcation != Bifurcation::locate || solver_.potential().elements().edges() <= most_searched_edges;
 }
@@ -85,7 +86,7 @@ PetscErrorCode TimeLoop::locateNext(const State &start, const Step &step, Critic
   BranchPoint low;
   low.parameter = start.time;
   low.state = start;
-  PetscCall(locateCritical(solver_, step, follow, low, step.time, std::abs(step.time), point, found));
+  PetscCall(locateCritical(solver_, step, follow, low, step.time, std::abs(step.time), located_, point, found));
   PetscFunctionReturn(0);
 }
 

@@ -177,7 +177,7 @@ PetscErrorCode ArcLength::locateBifurcation(const State &start, const State &end
   settings.mixed = settings_.mixed;
   for (bool found = low.unstable >= 0; found;) {
     CriticalPoint point;
-    PetscCall(locateCritical(solver_, settings, follow, low, length, length, &point, &found));
+    PetscCall(locateCritical(solver_, settings, follow, low, length, length, low.parameter, &point, &found));
     if (!found) break;
     found = point.beyond.found;
     low = point.beyond;

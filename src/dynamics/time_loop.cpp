@@ -63,6 +63,7 @@ double TimeLoop::shortest() const { return settings_.dt_min > 0 ? settings_.dt_m
 /// Solves the step. What it leads to is in `next`, block by block where the last stage is the end of the step; the
 /// state is not touched.
 PetscErrorCode TimeLoop::attempt(const State &state, State *next, Attempt *now) {
+  const IncrementalPotential &potential = solver_.potential();
   PetscFunctionBeginUser;
   if (settings_.dynamic) {
     PetscCall(solveStages(state, next, now));
@@ -75,6 +76,10 @@ PetscErrorCode TimeLoop::attempt(const State &state, State *next, Attempt *now) 
   if (mode_) guess = alongMode(state, now->step);
   PetscCall(solver_.solve(state, now->step, &now->report, Seek::minimum, guess ? &*guess : nullptr));
   solver_.on_block = nullptr;
+  next->time = now->step.time;
+  if (now->report.converged) // here, for a search for critical points within the step moves the iterate
+    now->work =
+        staticWork(potential.scene(), potential.elements(), state, *next, potential.start(), potential.iterate());
   PetscFunctionReturn(0);
 }
 
@@ -88,13 +93,11 @@ void TimeLoop::Attempt::commit(const IncrementalPotential &potential, RodSet rod
 bool TimeLoop::mayPassCritical(const State &state, const NewtonReport &report) const {
   return !settings_.dynamic && settings_.bifurcation != Bifurcation::off &&
          solver_.potential().scene().moments.empty() && control.stable && located_ <= state.time &&
-         (report.first_negative_pivots > 0 ||
-          (settings_.bifurcation != Bifurcation::locate && report.mayPassCritical()));
+         (report.first_negative_pivots > 0 || (isThorough() && report.mayPassCritical()));
 }
 
 /// Makes the answer of a step the state. Work since the last row adds to `work`.
 void TimeLoop::accept(State &state, State &next, Attempt *now, Work *work) {
-  IncrementalPotential &potential = solver_.potential();
   mode_.reset();
   if (settings_.dynamic) {
     *work = dynamicWork(state, now->h);
@@ -106,7 +109,7 @@ void TimeLoop::accept(State &state, State &next, Attempt *now, Work *work) {
     remember(state, now->h, &next);
     control.error_sum += now->error.error;
   } else
-    *work += staticWork(potential.scene(), potential.elements(), state, next, potential.start(), potential.iterate());
+    *work += now->work;
   std::swap(state, next);
   if (settings_.dynamic) work->supports += movedKinetic(state);
   control.stable = now->report.negative_pivots == 0;

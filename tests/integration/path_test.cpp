@@ -20,7 +20,7 @@ double criticalLoad(const std::string &id) {
 
 struct Path {
   std::vector<CriticalPoint> critical;
-  std::vector<double> factor, step, rounding_error;
+  std::vector<double> factor, step, rounding_error, work;
   std::vector<int> negative;
   std::vector<State> states;
   std::string failure;
@@ -40,6 +40,7 @@ Path follow(const Scene &scene, const LoopSettings &settings) {
     path.factor.push_back(row.time);
     path.step.push_back(row.dt);
     path.rounding_error.push_back(row.rounding_error);
+    path.work.push_back(row.work.total());
     path.negative.push_back(row.negative_pivots);
     path.states.push_back(state);
     return PetscErrorCode(0);
@@ -344,14 +345,42 @@ TEST(CriticalFactor, OfAHeavyColumnIsOneWhateverTheSteps) {
 TEST(CriticalFactor, OfATwistedRodIsOneWhateverTheSteps) {
   const Scene scene = sceneOf("verify/writhing.yaml");
   double first = 0;
-  for (const int steps : {1, 3, 7, 40}) {
-    LoopSettings settings = statics(steps);
-    settings.bifurcation = Bifurcation::stop;
-    const Path path = follow(scene, settings);
-    ASSERT_EQ(path.critical.size(), 1u) << steps;
-    if (first == 0) first = path.critical[0].load_factor;
-    EXPECT_NEAR(path.critical[0].load_factor, first, 3e-8 * first) << steps; // measured 1e-8
+  for (const Bifurcation bifurcation : {Bifurcation::stop, Bifurcation::locate})
+    for (const int steps : {1, 3, 7, 20, 21, 40}) { // of 20 and 21 Newton goes on to the buckle and meets no saddle
+      LoopSettings settings = statics(steps);
+      settings.bifurcation = bifurcation;
+      const Path path = follow(scene, settings);
+      ASSERT_EQ(path.critical.size(), 1u) << steps;
+      if (first == 0) first = path.critical[0].load_factor;
+      EXPECT_NEAR(path.critical[0].load_factor, first, 3e-8 * first) << steps; // measured 2.8e-8, of rounding
+    }
+}
+
+/// Also on it, and so little beside it that Newton takes the saddle there for a motion that costs nothing.
+TEST(CriticalFactor, IsFoundBesideTheEndOfAStep) {
+  const double euler = discreteEulerLoad(64);
+  for (const double beside : {-1e-4, -1e-6, -2e-8, -1e-8, -5e-9, 0.0, 5e-9, 1e-8, 1e-6, 1e-4}) {
+    const double factor = 0.3 * (1 + beside);
+    Scene scene = sceneOf("column.yaml");
+    scene.forces[0].force *= euler / 4 * (1 - euler / 1e8) / factor;
+    for (const int steps : {10, 40}) { // steps of 0.1 end at 0.1, 0.3 and 0.7
+      const Path path = follow(scene, statics(steps));
+      ASSERT_EQ(path.critical.size(), 1u) << beside << " " << steps;
+      EXPECT_NEAR(path.critical[0].load_factor, factor, step_tolerance * factor) << beside << " " << steps;
+    }
   }
+}
+
+/// What is searched within a step changes nothing of what is told of it.
+TEST(CriticalFactor, LeavesTheStepAsItIs) {
+  const Scene scene = sceneOf("verify/writhing.yaml");
+  LoopSettings settings = statics(10);
+  const Path located = follow(scene, settings);
+  settings.bifurcation = Bifurcation::off;
+  const Path steps = follow(scene, settings);
+  EXPECT_EQ(located.critical.size(), 1u);
+  EXPECT_EQ(located.end, steps.end);
+  EXPECT_EQ(located.work, steps.work);
 }
 
 /// A rod that hangs out from an axis about which it turns may stand anywhere around it.

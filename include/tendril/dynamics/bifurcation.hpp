@@ -43,9 +43,11 @@ PetscErrorCode criticalMode(StepSolver &solver, const CriticalPoint &point, Step
 /// Finds the critical point between `low` and the parameter `high` by bisection to 1e-9 of `scale`, and once more from
 /// points on either side of it, in other steps. `point` is the end of the interval towards `low`. `found` is false
 /// where there is none: nothing changes, Newton had gone over to another branch, no motion loses its stiffness, or the
-/// two answers differ by more than 1e-7, as they do where a count is rounding. \param step its settings, but the load
+/// two answers differ by more than 1e-7, as they do where a count is rounding. It may lie a little before `low`, where
+/// the count there was rounding. \param step its settings, but the load \param known parameter of the last one that was
+/// found before
 PetscErrorCode locateCritical(StepSolver &solver, const Step &step, const Follow &follow, BranchPoint low, double high,
-                              double scale, CriticalPoint *point, bool *found);
+                              double scale, double known, CriticalPoint *point, bool *found);
 
 /// Counts the unstable motions at the iterate: eigenvalues of the Hessian below a little less than zero, which leaves
 /// motions out that cost nothing.

@@ -92,6 +92,7 @@ private:
     double h = 0; ///< its length [s, or load factor]
     NewtonReport report;
     EnergyBudget energy;
+    Work work; ///< statics
     StepError error;
     bool too_coarse = false; ///< for the error asked for
     void commit(const IncrementalPotential &potential, RodSet rods, State *next);
