@@ -20,9 +20,9 @@ import numpy as np
 
 FORMATS = (1, 2)
 PLACES = ("vertices", "edges", "cells")
-ROWS = ("supports", "constraints")  # of fields that are not of rods
+ROWS = ("supports", "constraints", "colliders")  # of fields that are not of rods
 ON_DEMAND = ("curvature", "twist", "strain_energy_density", "force", "moment", "reaction", "reaction_moment",
-             "constraint_deviation", "constraint_force", "position_low")
+             "constraint_deviation", "constraint_force", "contact_force", "position_low")
 
 # Place and unit of what is in files of format 1; later ones tell by themselves.
 FORMAT_1_FIELDS = {
@@ -248,7 +248,7 @@ class Constraint:
 
 
 class Thing:
-    """A body or a collider. shape: plane, sphere, box, capsule or mesh, with its parameters (k,); of a mesh `vertices`
+    """A body or a collider. shape: plane, sphere, box, capsule, cylinder, tube or mesh, with its parameters (k,); of a mesh `vertices`
     (n, 3) [m] and `triangles` (m, 3), otherwise None; mass [kg] and inertia (3, 3) [kg m^2] of bodies, or None."""
 
     def __init__(self, trajectory, group, index):
@@ -544,7 +544,7 @@ class Trajectory:
         except ImportError:
             raise TendrilError("to_xarray needs xarray: apt-get install python3-xarray") from None
         dimension = {"vertices": "vertex", "edges": "edge", "cells": "cell", "supports": "support",
-                     "constraints": "constraint"}
+                     "constraints": "constraint", "colliders": "collider"}
         variables = {}
         for name in self._fields:
             field = self.field(name)

@@ -185,6 +185,7 @@ def mesh(vertices, triangles, colour):
                                       np.broadcast_to(np.asarray(colour, float), corner.shape)))
 
 
+ENDLESS = 20  # how many radii of an endless cylinder or tube are drawn, to each side
 BOX = np.array([[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]])
 BOX_TRIANGLES = [[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7], [0, 1, 5], [0, 5, 4],
                  [2, 3, 7], [2, 7, 6], [1, 2, 6], [1, 6, 5], [3, 0, 4], [3, 4, 7]]
@@ -202,7 +203,8 @@ def body(shape, parameters, position, quaternion, colour, vertices=None, triangl
     """A body or collider at its pose: position (3,) [m], quaternion (w, x, y, z).
 
     parameters [m]: sphere (radius); box (three half lengths); capsule (radius, half length between the centres of its
-    ends, along z); plane (normal, three numbers; default z), through the position; mesh: vertices and triangles.
+    ends, along z); cylinder (radius, half length); tube (bore, outer radius, half length), drawn as rings and lines
+    so that one sees what is in it; plane (normal, three numbers; default z), through the position; mesh: vertices and triangles.
     """
     p, R, at = np.atleast_1d(np.asarray(parameters, float)), rotation(quaternion), np.asarray(position, float)
     if shape == "plane":
@@ -214,8 +216,19 @@ def body(shape, parameters, position, quaternion, colour, vertices=None, triangl
         ball = tube(ends, R[:, :1].T, (p[0], p[0]), np.tile(colour, (2, 1)), group=group)
         ball.capsules.flat[:] = False
         return ball
+    if shape == "cylinder":
+        along = R[:, 2] * (p[1] if np.isfinite(p[1]) else ENDLESS * p[0])
+        return tube(np.stack([at - along, at + along]), R[:, :1].T, (p[0], p[0]), np.tile(colour, (2, 1)), group=group)
+    if shape == "tube":
+        half = p[2] if np.isfinite(p[2]) else ENDLESS * p[0]
+        angles = np.linspace(0, 2 * np.pi, 49)
+        circle = p[0] * np.stack([np.cos(angles), np.sin(angles), 0 * angles], 1)
+        lines = [circle + [0, 0, z] for z in np.linspace(-half, half, 2 + int(half / p[0]))]
+        lines += [np.array([c - [0, 0, half], c + [0, 0, half]]) for c in circle[:-1:8]]
+        return join([tube(x @ R.T + at, np.tile(R[:, 0], (len(x) - 1, 1)), (0, 0), np.tile(colour, (len(x), 1)),
+                          group=group) for x in lines])
     if shape == "box":
         return mesh(BOX * p[:3] @ R.T + at, BOX_TRIANGLES, colour)
     if shape == "mesh":
         return mesh(np.asarray(vertices, float) @ R.T + at, triangles, colour)
-    raise ValueError(f"shape {shape}: known are plane, sphere, box, capsule and mesh")
+    raise ValueError(f"shape {shape}: known are plane, sphere, box, capsule, cylinder, tube and mesh")

@@ -23,7 +23,9 @@ const std::vector<DiagnosticsColumn> &diagnosticsColumns() {
       {"rounding_error", "1", [](const D &d) { return d.rounding_error; }},
       {"work_loads", "J", [](const D &d) { return d.work.loads; }},
       {"work_supports", "J", [](const D &d) { return d.work.supports; }},
-      {"constraint", "J", [](const D &d) { return d.energy.constraint; }}};
+      {"constraint", "J", [](const D &d) { return d.energy.constraint; }},
+      {"contact", "J", [](const D &d) { return d.energy.contact; }},
+      {"contact_gap_min", "m", [](const D &d) { return d.contact_gap_min; }}};
   return columns;
 }
 

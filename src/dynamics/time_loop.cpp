@@ -86,6 +86,8 @@ PetscErrorCode TimeLoop::attempt(const State &state, State *next, Attempt *now) 
 void TimeLoop::Attempt::commit(const IncrementalPotential &potential, RodSet rods, State *next) {
   potential.commitConfiguration(*next, rods);
   energy += potential.energyBudget(*next, potential.iterate(), step.load_factor, rods);
+  gap = std::min(gap, potential.smallestGap(rods));
+  obstacle_work += potential.workOfObstacles(rods);
 }
 
 /// Whether a critical point may lie within the step. Couples have no potential: the inertia of the symmetric part says
@@ -112,6 +114,7 @@ void TimeLoop::accept(State &state, State &next, Attempt *now, Work *work) {
     *work += now->work;
   std::swap(state, next);
   if (settings_.dynamic) work->supports += movedKinetic(state);
+  work->supports += now->obstacle_work;
   control.stable = now->report.negative_pivots == 0;
   control.rounding_sum =
       settings_.dynamic ? control.rounding_sum + now->report.rounding_error : now->report.rounding_error;
@@ -147,6 +150,7 @@ Diagnostics TimeLoop::rowOf(const State &state, const Attempt &now, const Work &
   row.time = state.time;
   row.dt = now.h;
   row.energy = now.energy;
+  row.contact_gap_min = now.gap;
   row.work = work;
   row.dissipated = control.energy + work.total() - now.energy.total();
   control.energy = now.energy.total();

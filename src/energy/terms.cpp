@@ -52,6 +52,7 @@ EnergyBudget &EnergyBudget::operator+=(const EnergyBudget &other) {
   twist += other.twist;
   gravity += other.gravity;
   constraint += other.constraint;
+  contact += other.contact;
   return *this;
 }
 

@@ -98,6 +98,10 @@ template <class Archive, class AnyContents> void exchange(Archive &a, AnyContent
   std::size_t actions = s.support_actions.size();
   whole("remembered_actions", actions, 1e15);
   a.array("support_actions", s.support_actions, actions);
+  if (a.format_version < 4) return;
+  std::size_t stiffness = s.contact_stiffness.size();
+  whole("rods_in_contact", stiffness, 1e15);
+  a.array("contact_stiffness", s.contact_stiffness, stiffness);
 }
 
 /// Whole turns of cells that were others in the checkpoint: the twist of a vertex along the rod stays what it was, by
@@ -136,6 +140,7 @@ void beginAnew(const Simulation &run, State *state, std::vector<std::string> *to
   state->memory.clear();
   state->strains.clear();
   state->support_actions.clear();
+  state->contact_stiffness.clear();
   state->last_dt = state->dt_before = 0;
   const Configuration c = configurationOf(*state, run.scene, *run.elements, state->time);
   for (std::size_t r = 0; r < run.elements->rods.size(); ++r) {

@@ -14,13 +14,6 @@ double stiffestTurning(const Material &m) {
   return std::max({m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness});
 }
 
-std::string readName(const YamlValue &value) {
-  const std::string name = value.text();
-  if (name.empty() || name != inOneLine(name) || name.front() == ' ' || name.back() == ' ')
-    value.fail("'name' must be in one line, neither empty nor with blanks around it, found '" + inOneLine(name) + "'");
-  return name;
-}
-
 int closestVertex(const Rod &rod, const Vec3 &point) {
   auto away = [&](const Vec3 &x) { return (x - point).squaredNorm(); };
   return int(std::min_element(rod.position.begin(), rod.position.end(),

@@ -131,8 +131,13 @@ std::string rulesOf(std::string_view block) {
  "then": {"oneOf": [{"required": ["vertex"], "properties": {"closest": {"const": false}}}, {"required": ["closest", "point"], "properties": {"closest": {"const": true}}}],
   "not": {"anyOf": [{"required": ["edge"]}, {"required": ["tangent"]}, {"required": ["director"]}, {"required": ["measure"]}]}},
  "else": {"required": ["edge"], "not": {"anyOf": [{"required": ["vertex"]}, {"required": ["closest"]}, {"required": ["point"]}]}})";
-  if (block == "supports[].motion" || block == "constraints[].motion")
+  if (block == "supports[].motion" || block == "constraints[].motion" || block == "colliders[].motion")
     return R"("oneOf": [{"required": ["table"]}, {"anyOf": [{"required": ["velocity"]}, {"required": ["angular_velocity"]}]}])";
+  if (block == "contact")
+    return R"("if": {"required": ["radius"], "properties": {"radius": {"const": 0}}},
+ "then": {"required": ["law"], "properties": {"law": {"const": "penalty"}}})";
+  if (block == "colliders[]")
+    return R"("oneOf": [{"required": ["plane"]}, {"required": ["sphere"]}, {"required": ["capsule"]}, {"required": ["cylinder"]}, {"required": ["box"]}, {"required": ["tube"]}, {"required": ["mesh"]}])";
   if (block == "loads[]")
     return R"("oneOf": [
  {"required": ["vertex", "force"], "not": {"anyOf": [{"required": ["edge"]}, {"required": ["torque"]}, {"required": ["moment"]}]}},

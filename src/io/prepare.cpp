@@ -1,5 +1,6 @@
 #include "tendril/io/prepare.hpp"
 
+#include "tendril/contact/contact.hpp"
 #include "tendril/dynamics/arc_length.hpp"
 #include "tendril/io/text.hpp"
 #include "tendril/solver/activity.hpp"
@@ -17,17 +18,43 @@ void requireHeld(const Scene &scene) {
                                   [&](const Support &s) { return s.rod == int(r) && s.holdsPosition(); }) ||
                       std::any_of(scene.constraints.begin(), scene.constraints.end(),
                                   [&](const Constraint &c) { return c.rod == int(r) && c.isPin() && c.stiffness > 0; });
-    if (!held)
+    if (!held && !scene.touches(int(r))) // what obstacles hold shows
       throw SceneError(
           "rod '" + scene.rods[r].name +
           "' is free to move as a whole: -mode static needs a clamp, pins or constraints that hold every rod");
   }
 }
 
+/// Where rods lie in obstacles as drawn.
+void refuseOverlaps(const Simulation &run) {
+  const Scene &scene = run.scene;
+  const Configuration drawn = configurationOf(run.state, scene, *run.elements, run.state.time);
+  for (const Touch &o : tightest(scene, *run.elements, drawn)) {
+    const ContactSettings &contact = scene.rods[o.rod].contact;
+    if (o.gap > contact.wall()) continue;
+    throw SceneError("rod '" + scene.rods[o.rod].name + "' lies " + shortText(-o.gap) + " m deep in collider '" +
+                     scene.colliders[o.collider].name + "' at its start, at arc length " + shortText(o.arc) +
+                     " m; move one of them by " + shortText(contact.wall() - o.gap + 0.5 * contact.distance) +
+                     " m or more, give the rod a smaller 'contact: {radius: ...}' than " + shortText(contact.radius) +
+                     " m, or write 'contact: none'");
+  }
+}
+
+/// Where a rod begins to touch moves with the edges: errors do not fall with the square of their length.
+void refuseWithObstacles(const Options &o) {
+  const bool arc = !o.loop.dynamic && o.loop.continuation == Continuation::arclength;
+  const bool estimates = o.error_estimate && !o.loop.dynamic;
+  if (!o.accuracy && !estimates && !arc) return;
+  const std::string option = arc ? "-continuation arclength" : o.accuracy ? "-accuracy" : "-error_estimate";
+  throw SceneError("option " + option + ": is not for scenes with 'colliders' yet; " +
+                   (arc ? "take load steps" : "compare runs with -rod_edges, and with other values of -dt"));
+}
+
 PetscErrorCode makeReady(Scene scene, const Options &o, std::unique_ptr<Simulation> &run) {
   PetscFunctionBeginUser;
   run = std::make_unique<Simulation>();
   PetscCall(run->setUp(std::move(scene), o.loop));
+  if (!run->scene.colliders.empty() && o.restart.empty()) refuseOverlaps(*run);
   PetscCall(run->solver.rehearse(run->state, TimeLoop::stepOf(o.loop, run->state, o.loop.dt)));
   PetscFunctionReturn(0);
 }
@@ -65,6 +92,7 @@ PetscErrorCode prepare(Prepared &prepared, Options &o) {
           std::string("option ") + (o.accuracy ? "-accuracy" : "-error_estimate") + ": constraint '" + c.name +
           "' turns an edge, whose middle moves when edges change: errors do not fall with the square of their "
           "length; take a clamp, or compare runs with -rod_edges");
+  if (!file.scene.colliders.empty()) refuseWithObstacles(o);
   if (o.accuracy && o.accuracy->of == Quantity::tip)
     for (const Rod &rod : file.scene.rods)
       if (rod.closed)

@@ -55,6 +55,29 @@ std::string textOf(const Constraint &c) {
   return text + textOf(c.motion);
 }
 
+std::string textOf(const ContactSettings &c) {
+  if (!c.on) return "none";
+  return std::string(c.isBarrier() ? "barrier of width " + textOf(c.distance)
+                                   : "penalty from " + textOf(c.threshold) + ", smoothing " + textOf(c.smoothing)) +
+         ", radius " + textOf(c.radius) + ", stiffness " + textOf(c.stiffness) + ", quadrature " +
+         std::to_string(c.quadrature) + ", friction " + textOf(c.friction) +
+         (c.friction_at_surface ? " at the surface" : " at the centreline") + ", falling off below " +
+         textOf(c.fall_off_velocity) + " and " + textOf(c.slip_length) + ", damping " + textOf(c.tangential_damping) +
+         " and " + textOf(c.normal_damping);
+}
+
+std::string textOf(const Collider &c) {
+  std::string text = c.kind + " of size " + textOf(c.size) + " at " + textOf(c.position) + ", axes";
+  for (int k = 0; k < 3; ++k) text += " " + textOf(Vec3(c.rotation.col(k)));
+  if (c.mesh) {
+    Digest d;
+    d.add(c.mesh->vertices.data(), c.mesh->vertices.size() * sizeof(Vec3));
+    d.add(c.mesh->triangles.data(), c.mesh->triangles.size() * sizeof(c.mesh->triangles[0]));
+    text += ", mesh #" + d.hex();
+  }
+  return text + (c.friction < 0 ? "" : ", friction " + textOf(c.friction)) + textOf(c.motion);
+}
+
 using Kind = RunFacts::Kind;
 constexpr const char *kinds[] = {"option", "load", "scene", "start"};
 constexpr const char *order_of_rods = "order of the rods", *names_of_rods = "names of the rods",
@@ -202,6 +225,9 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
     add(Kind::scene, at(c.isPin() ? "constraint at vertex " : "constraint at edge ", c.at, c.rod), textOf(c));
   }
   add(Kind::scene, order_of_holders, "#" + holders.hex());
+  for (const Collider &c : scene.colliders) add(Kind::scene, "collider '" + c.name + "'", textOf(c));
+  for (const Rod &rod : scene.rods)
+    if (!scene.colliders.empty()) add(Kind::scene, "contact of rod '" + rod.name + "'", textOf(rod.contact));
   for (const NodalForce &f : scene.forces) add(Kind::load, at("force on vertex ", f.vertex, f.rod), textOf(f.force));
   for (const EdgeMoment &m : scene.moments) {
     if (m.torque != 0) add(Kind::load, at("torque on edge ", m.edge, m.rod), textOf(m.torque));

@@ -1,5 +1,6 @@
 #include "tendril/io/scene_reader.hpp"
 
+#include "tendril/io/collider_reader.hpp"
 #include "tendril/io/polyline_reader.hpp"
 #include "tendril/io/support_reader.hpp"
 #include "tendril/io/text.hpp"
@@ -152,6 +153,7 @@ std::string readName(YamlMap &map, const RodNames &names) {
 /// Of all blocks of rods.
 struct Sums {
   double vertices = 0;
+  ContactSettings contact; ///< what the scene says of it
   std::map<std::string, std::vector<std::string>>
       defaults; ///< names of the blocks that take the same parameters by default
 };
@@ -209,6 +211,8 @@ void readRod(const YamlValue &value, const Overrides &overrides, SceneFile &out,
   common.initial_turns = map.number("rods[].turns");
   readNatural(map, common);
   common.closed = map.flag("rods[].closed");
+  common.contact = sums.contact;
+  readContact(map, common.contact);
   Copies copies;
   if (map.has("rods[].copies")) {
     YamlMap m(map.at("rods[].copies"), "rods[].copies");
@@ -284,6 +288,7 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
   }
   readRun(map.has("simulation") ? map.at("simulation") : YamlValue(YAML::Load("{}"), path, "simulation"), out.run);
   Sums sums;
+  sums.contact = readContact(map);
   for (const YamlValue &v : map.at("rods").items()) readRod(v, overrides, out, sums);
   for (const auto &[values, names] : sums.defaults)
     out.notes.push_back(values + " (rod '" + names[0] + "'" +
@@ -295,6 +300,10 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
     for (const YamlValue &v : map.at("constraints").items()) readConstraint(v, out);
   if (map.has("loads"))
     for (const YamlValue &v : map.at("loads").items()) readLoad(v, out);
+  if (map.has("colliders")) {
+    for (const YamlValue &v : map.at("colliders").items()) readCollider(v, out.scene);
+    if (!out.scene.colliders.empty()) completeContact(map.at("colliders"), out.scene);
+  }
   map.finish();
   out.source.paths = {path};
   keepFiles(map.at("rods"), out.source);

@@ -1,5 +1,7 @@
 #include "tendril/io/support_reader.hpp"
 
+#include "tendril/io/text.hpp"
+
 #include <algorithm>
 #include <sstream>
 
@@ -9,6 +11,13 @@ Vec3 unit(const YamlValue &value) {
   const Vec3 v = value.vector();
   if (v.norm() == 0) value.fail("'" + value.name() + "' must not be zero");
   return v.normalized();
+}
+
+std::string readName(const YamlValue &value) {
+  const std::string name = value.text();
+  if (name.empty() || name != inOneLine(name) || name.front() == ' ' || name.back() == ' ')
+    value.fail("'name' must be in one line, neither empty nor with blanks around it, found '" + inOneLine(name) + "'");
+  return name;
 }
 
 std::vector<int> readTargets(YamlMap &map, KeyOf<KeyType::rod> key, const RodNames &rods) {

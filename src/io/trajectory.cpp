@@ -1,5 +1,6 @@
 #include "tendril/io/trajectory.hpp"
 
+#include "tendril/contact/contact.hpp"
 #include "tendril/energy/derived.hpp"
 
 #include <algorithm>
@@ -13,8 +14,8 @@
 namespace tendril {
 namespace {
 
-enum class On { vertices, edges, cells, supports, constraints };
-constexpr const char *places[] = {"vertices", "edges", "cells", "supports", "constraints"};
+enum class On { vertices, edges, cells, supports, constraints, colliders };
+constexpr const char *places[] = {"vertices", "edges", "cells", "supports", "constraints", "colliders"};
 
 /// A frame about to be written: a state and what is derived from it, as far as some field needs it.
 struct Snapshot {
@@ -22,8 +23,10 @@ struct Snapshot {
   RodStrains strains;
   RodActions actions;
   std::vector<double> constraint_deviation = {}, constraint_force = {};
+  std::vector<Vec3> contact_force = {}, collider_position = {};
+  std::vector<Eigen::Vector4d> collider_rotation = {};
 };
-enum class From { state, second_word, strains, actions };
+enum class From { state, second_word, strains, actions, contact, motion };
 
 struct Field {
   const char *name, *unit;
@@ -58,20 +61,34 @@ const Field fields[] = {
      [](const Snapshot &s) { return s.constraint_deviation.data(); }},
     {"constraint_force", "N, N m", On::constraints, 6, From::actions,
      [](const Snapshot &s) { return s.constraint_force.data(); }},
+    {"contact_force", "N", On::vertices, 3, From::contact, [](const Snapshot &s) { return s.contact_force[0].data(); }},
+    // Where obstacles stand, and quaternions w, x, y, z from their axes to the world's; where any moves.
+    {"collider_position", "m", On::colliders, 3, From::motion,
+     [](const Snapshot &s) { return s.collider_position[0].data(); }},
+    {"collider_rotation", "1", On::colliders, 4, From::motion,
+     [](const Snapshot &s) { return s.collider_rotation[0].data(); }},
 };
+
+/// Fields that are written where nothing else is said.
+bool isUsual(From source) { return source == From::state || source == From::motion; }
 
 std::vector<std::string> namesOf(bool derived) {
   std::vector<std::string> names;
   for (const Field &f : fields)
-    if ((f.source != From::state) == derived) names.push_back(f.name);
+    if (isUsual(f.source) != derived) names.push_back(f.name);
   return names;
 }
 
 constexpr auto patience = std::chrono::milliseconds(500); ///< how long rows and frames may wait
 constexpr std::size_t most_waiting = 4 << 20;             ///< [bytes]
 
-std::array<int, 5> sizes(const Elements &e) {
-  return {e.vertices(), e.edges(), int(e.cell_slot.size()), int(e.support_slot.size()), int(e.constraint_slot.size())};
+std::array<int, 6> sizes(const Scene &scene, const Elements &e) {
+  return {e.vertices(),
+          e.edges(),
+          int(e.cell_slot.size()),
+          int(e.support_slot.size()),
+          int(e.constraint_slot.size()),
+          int(scene.colliders.size())};
 }
 
 } // namespace
@@ -104,7 +121,9 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
     if (f.place == On::cells &&
         std::find(elements.measure.begin(), elements.measure.end(), Measure::angle) == elements.measure.end())
       continue;
-    std::vector<hsize_t> slab{hsize_t(sizes(elements)[std::size_t(f.place)])};
+    if ((f.source == From::contact && scene.colliders.empty()) || (f.source == From::motion && !scene.collidersMove()))
+      continue;
+    std::vector<hsize_t> slab{hsize_t(sizes(scene, elements)[std::size_t(f.place)])};
     if (slab[0] == 0) continue; // cables have no cells, free rods no supports or constraints
     if (f.components > 1) slab.push_back(f.components);
     state_.back() = std::make_unique<Hdf5Series>(file_, std::string("state/") + f.name, slab);
@@ -162,6 +181,15 @@ void TrajectoryWriter::writeFrame(const State &state) {
     snapshot.strains = rodStrains(scene_, elements_, state, state.time, dynamic_ ? 1 : state.time);
   if (wanted(From::actions))
     snapshot.actions = rodActions(scene_, elements_, state, state.time, dynamic_ ? 1 : state.time, dynamic_);
+  if (wanted(From::contact))
+    snapshot.contact_force =
+        contactForces(scene_, elements_, state, configurationOf(state, scene_, elements_, state.time));
+  for (const Collider &c : scene_.colliders) {
+    const Collider::Pose pose = c.poseAt(state.time);
+    const Eigen::Quaterniond q(pose.rotation);
+    snapshot.collider_position.push_back(pose.position);
+    snapshot.collider_rotation.emplace_back(q.w(), q.x(), q.y(), q.z());
+  }
   for (const ConstraintReading &c : snapshot.actions.constraint) {
     for (const Vec3 *x : {&c.distance, &c.rotation})
       snapshot.constraint_deviation.insert(snapshot.constraint_deviation.end(), x->data(), x->data() + 3);
@@ -267,7 +295,7 @@ std::string TrajectoryWriter::xdmfFrame(bool edges) const {
   for (std::size_t k = 1; k < state_.size(); ++k) {
     const Field &f = fields[k];
     if (!state_[k] || f.place == On::cells || f.place == On::supports || f.place == On::constraints ||
-        (f.place == On::edges && !edges))
+        f.place == On::colliders || (f.place == On::edges && !edges))
       continue;
     if (f.components != 2)
       attribute(f);

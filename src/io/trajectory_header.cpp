@@ -64,6 +64,7 @@ void TrajectoryWriter::writeHeader(const Scene &scene, const Elements &elements,
   writeRods();
   writeSupports();
   writeConstraints();
+  writeColliders();
   writeMaterials();
 }
 
@@ -134,6 +135,46 @@ void TrajectoryWriter::writeConstraints() {
   file_.write("constraints/type", types);
   file_.write("constraints/rod", {rods.size()}, rods.data());
   file_.write("constraints/place", {places.size()}, places.data());
+}
+
+/// Radii, then half lengths.
+static std::vector<double> parametersOf(const Collider &c) {
+  if (c.kind == "sphere") return {c.size[0]};
+  if (c.kind == "capsule" || c.kind == "cylinder") return {c.size[0], 0.5 * c.size[1]};
+  if (c.kind == "box") return {0.5 * c.size[0], 0.5 * c.size[1], 0.5 * c.size[2]};
+  if (c.kind == "tube") return {c.size[0], c.size[1], 0.5 * c.size[2]};
+  return {}; // of a plane: z is its normal
+}
+
+void TrajectoryWriter::writeColliders() {
+  if (scene_.colliders.empty()) return;
+  const std::size_t n = scene_.colliders.size();
+  std::vector<std::string> names, shapes;
+  std::vector<double> parameters, positions, rotations;
+  for (const Collider &c : scene_.colliders) {
+    const Eigen::Quaterniond q(c.rotation);
+    names.push_back(c.name);
+    shapes.push_back(c.kind);
+    const std::vector<double> p = parametersOf(c);
+    for (std::size_t k = 0; k < 3; ++k) parameters.push_back(k < p.size() ? p[k] : std::nan(""));
+    positions.insert(positions.end(), c.position.data(), c.position.data() + 3);
+    rotations.insert(rotations.end(), {q.w(), q.x(), q.y(), q.z()});
+  }
+  file_.createGroup("colliders");
+  file_.createGroup("colliders/meshes");
+  for (std::size_t k = 0; k < n; ++k) {
+    if (!scene_.colliders[k].mesh) continue;
+    const TriangleMesh &mesh = *scene_.colliders[k].mesh;
+    const std::string group = "colliders/meshes/" + std::to_string(k);
+    file_.createGroup(group);
+    file_.write(group + "/vertices", {mesh.vertices.size(), 3}, mesh.vertices[0].data(), "m");
+    file_.write(group + "/triangles", {mesh.triangles.size(), 3}, mesh.triangles[0].data());
+  }
+  file_.write("colliders/name", names);
+  file_.write("colliders/shape", shapes);
+  file_.write("colliders/parameters", {n, 3}, parameters.data(), "m");
+  file_.write("colliders/position", {n, 3}, positions.data(), "m");
+  file_.write("colliders/rotation", {n, 4}, rotations.data(), "1");
 }
 
 void TrajectoryWriter::writeMaterials() {

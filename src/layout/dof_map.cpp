@@ -144,11 +144,11 @@ struct Part {
 
 } // namespace
 
-PetscErrorCode DofMap::createMatrix(Mat *matrix) {
+PetscErrorCode DofMap::createMatrix(Mat *matrix, bool joins) {
   PetscFunctionBeginUser;
   std::vector<PetscInt> row, column;
   source_.clear();
-  EdgeBlocks blocks; // its window is that of all rods, which begins with the first
+  EdgeBlocks blocks(0, joins); // its window is that of all rods, which begins with the first
   blocks.setOrigin(rods_.front().first_slot);
   for (const RodRange &rod : rods_) {
     auto slot = [&](int i) { return rod.slot(rod.closed ? i % rod.vertices : i); };
@@ -180,6 +180,9 @@ PetscErrorCode DofMap::createMatrix(Mat *matrix) {
     for (int i = 1; i < rod.edges + (rod.closed ? 1 : 0); ++i)
       for (int r = 0; r < edge_size; ++r)
         for (int c = 0; c < edge_size; ++c) couple(edge(i - 1, r), edge(i, c), EdgeBlocks::across(r, c), i, false);
+    for (int i = 0; i < rod.edges && joins; ++i)
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < edge_size; ++c) couple(position(i, r), edge(i, c), EdgeBlocks::joined(r, c), i, false);
     for (int i = 0; i < rod.vertices; ++i)
       for (int r = 0; r < 3; ++r)
         for (int c = r; c < 3; ++c) couple(position(i, r), position(i, c), EdgeBlocks::vertex(r, c), i, r == c);

@@ -2,9 +2,7 @@
 
 namespace tendril {
 
-void EdgeBlocks::clear(const RodRange &rod) {
-  std::fill_n(entry(rod, 0) - 1, std::size_t(slot_entries) * rod.slots, 0.0);
-}
+void EdgeBlocks::clear(const RodRange &rod) { std::fill_n(entry(rod, 0) - 1, std::size_t(entries_) * rod.slots, 0.0); }
 
 void EdgeBlocks::subtractFrom(const EdgeBlocks &other) {
   for (std::size_t k = 0; k < data_.size(); ++k) data_[k] = other.data_[k] - data_[k];
@@ -13,7 +11,7 @@ void EdgeBlocks::subtractFrom(const EdgeBlocks &other) {
 /// What the last edge has with the first stays behind the ring.
 void EdgeBlocks::fold(const RodRange &rod) {
   if (!rod.closed) return;
-  for (int k = 0; k < slot_entries; ++k) {
+  for (int k = 0; k < entries_; ++k) {
     if (k >= edge_pairs && k < across(0, 0) + edge_size * edge_size) continue;
     double *plane = entry(rod, k);
     plane[0] += plane[rod.vertices];
@@ -40,6 +38,16 @@ void EdgeBlocks::multiply(const RodRange &rod, const Planes &x, Planes &y) const
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 3; ++c)
         y[r][rod.slot(i)] += value(vertex(std::min(r, c), std::max(r, c)), i) * x[c][rod.slot(i)];
+  for (int i = 0; i < rod.edges && joins(); ++i) {
+    const Four here = edge(i);
+    Four force{};
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < edge_size; ++c) {
+        y[r][rod.slot(i)] += value(joined(r, c), i) * here[c];
+        force[c] += value(joined(r, c), i) * x[r][rod.slot(i)];
+      }
+    add(i, force);
+  }
   Four before{};
   for (int i = 0; i < rod.edges + (rod.closed ? 1 : 0); ++i) {
     const Four here = edge(i == rod.vertices ? 0 : i);
@@ -70,6 +78,7 @@ double EdgeBlocks::magnitude(const RodRange &rod, const Planes &x) const {
       for (int c = 0; c < edge_size; ++c) {
         if (c >= r) sum += std::pow((r == c ? 1 : 2) * entry(rod, own(r, c))[i] * here[r] * here[c], 2);
         sum += std::pow(2 * entry(rod, across(r, c))[i] * before[r] * here[c], 2);
+        if (joins() && r < 3) sum += std::pow(2 * entry(rod, joined(r, c))[i] * x[r][rod.slot(i)] * here[c], 2);
       }
     before = here;
   }

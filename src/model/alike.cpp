@@ -81,7 +81,7 @@ std::vector<int> firstAlike(const Scene &scene, const std::vector<Drawing> &draw
   };
   std::vector<int> first, kinds;
   for (int s = 0; s < int(rods); ++s) {
-    const auto found = scene.rotation.angular_velocity.isZero(0)
+    const auto found = scene.rotation.angular_velocity.isZero(0) && scene.colliders.empty()
                            ? std::find_if(kinds.begin(), kinds.end(), [&](int r) { return alike(r, s); })
                            : kinds.end();
     first.push_back(found == kinds.end() ? s : *found);
@@ -94,6 +94,7 @@ Scene withRods(const Scene &scene, const std::vector<int> &rods) {
   Scene out;
   out.gravity = scene.gravity;
   out.rotation = scene.rotation;
+  out.colliders = scene.colliders;
   std::vector<int> place(scene.rods.size(), -1);
   for (const int r : rods) {
     place[r] = int(out.rods.size());

@@ -278,6 +278,7 @@ Scene remesh(const Scene &written, const std::vector<Drawing> &drawings, const s
   Scene scene;
   scene.gravity = written.gravity;
   scene.rotation = written.rotation;
+  scene.colliders = written.colliders;
   for (std::size_t r = 0; r < written.rods.size(); ++r)
     scene.rods.push_back(isRemeshed(written.rods[r], drawings[r], edges[r])
                              ? remeshed(written.rods[r], drawings[r], edges[r])

@@ -143,6 +143,7 @@ template <class T> void BandedFactor::factorGroup(const Group &group, const Band
   };
   const std::vector<char> &held = held_[group.rod[0] - rods_.begin];
   T *const vertex = as<T>(&workspace_.factors[group.factor]), *const records = vertex + vertex_record;
+  const bool joins = system.blocks->joins();
   T negative, zero;
   auto run = [&](auto elimination) {
     elimination.run(vertex);
@@ -150,11 +151,11 @@ template <class T> void BandedFactor::factorGroup(const Group &group, const Band
     zero = elimination.zero;
   };
   if (first.closed)
-    run(Elimination<T, true, decltype(rare)>(first, held, rare, records));
-  else if (shifted || cable || system.coupled_positions)
-    run(Elimination<T, false, decltype(rare)>(first, held, rare, records));
+    run(Elimination<T, true, decltype(rare)>(first, held, rare, records, joins));
+  else if (shifted || cable || system.coupled_positions || joins)
+    run(Elimination<T, false, decltype(rare)>(first, held, rare, records, joins));
   else
-    run(Elimination<T, false, decltype(plain)>(first, held, plain, records));
+    run(Elimination<T, false, decltype(plain)>(first, held, plain, records, false));
   for (int l = 0; l < group.count; ++l)
     if constexpr (std::is_same_v<T, Pack>) {
       negative_[group.rod[l] - rods_.begin] = int(negative[l]);

@@ -1,5 +1,6 @@
 #include "tendril/solver/hints.hpp"
 
+#include "tendril/contact/contact.hpp"
 #include "tendril/energy/constraint.hpp"
 #include "tendril/solver/imbalance.hpp"
 
@@ -48,6 +49,21 @@ std::string nearBarrier(const IncrementalPotential &potential, RodSet rods) {
                 " degrees of at most 180 from its edge: make it stiffer, or take measure: sine";
     }
   return hint;
+}
+
+std::string nearObstacle(const IncrementalPotential &potential, RodSet rods) {
+  const Scene &scene = potential.scene();
+  std::ostringstream hint;
+  for (const Touch &t : tightest(scene, potential.elements(), potential.iterate())) {
+    const ContactSettings &contact = scene.rods[t.rod].contact;
+    if (t.rod < rods.begin || t.rod >= rods.end || !(t.gap < (contact.isBarrier() ? -0.25 * contact.distance : 0)))
+      continue;
+    hint << std::setprecision(3) << "; rod '" << scene.rods[t.rod].name << "' is pressed against collider '"
+         << scene.colliders[t.collider].name << "' at arc length " << t.arc << " m, the gap is " << t.gap
+         << " m: is it held between obstacles, or driven into one? Shorter steps help against impacts";
+    break;
+  }
+  return hint.str();
 }
 
 /// Words on the rod of the energy `seed` that bends most sharply, more than `sharpest`, with its edges shorter than

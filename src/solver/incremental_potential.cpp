@@ -13,7 +13,8 @@ constexpr double epsilon = std::numeric_limits<double>::epsilon();
 IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, const Elements &elements, bool dynamic)
     : scene_(scene), dofs_(dofs), elements_(elements), retraction_(elements), axial_(scene, elements),
       terms_(makeTerms(scene, elements, axial_, dynamic)), supports_(scene, dofs, elements), start_(elements.slots),
-      known_(elements.rods.size(), Known::nothing), scales_(rodScales(scene, elements)) {}
+      known_(elements.rods.size(), Known::nothing), scales_(rodScales(scene, elements)),
+      obstacles_move_(scene.collidersMove()) {}
 
 void IncrementalPotential::beginStep(const State &start, const Step &step) {
   start_time_ = start.time;
@@ -37,9 +38,19 @@ void IncrementalPotential::beginRod(const State &start, int r) {
   if (step_.twist_reference) carryFrames(*step_.rule, elements_, r, start_, reference_);
   axial_.beginStep(start_, step_, r);
   for (auto &term : terms_) term->beginStep(start, start_, step_, r);
+  if (obstacles_move_) moveObstacles(r);
   supports_.follow(r, iterate_);
   scales_[r].force = tendril::forceScale(scene_, elements_, step_, start, scales_[r], r);
   known_[r] = Known::nothing;
+}
+
+/// As far as they can go while the rod stays; the rest is left to the iterations.
+void IncrementalPotential::moveObstacles(int r) {
+  constexpr double margin = 0.5; // closer, it would press harder than need be
+  iterate_.setObstacleTime(r, step_.time);
+  const double free = freeFraction(start_, iterate_, r);
+  if (free < 1) iterate_.setObstacleTime(r, start_time_ + margin * free * (step_.time - start_time_));
+  for (auto &term : terms_) term->moveIterate(iterate_, r);
 }
 
 void IncrementalPotential::setLoadFactor(double factor) {
@@ -97,8 +108,8 @@ IncrementalPotential::RodEnergy IncrementalPotential::rodEnergy(const Configurat
     const double energy = term->energy(c, r);
     result.value += energy;
     result.size += std::abs(energy);
-    result.noise +=
-        64 * epsilon * std::abs(energy) + delta * (std::sqrt(2 * std::abs(energy) * bending) + bending * delta);
+    result.noise += 64 * epsilon * std::abs(energy);
+    if (term->roundsAsStrains()) result.noise += delta * (std::sqrt(2 * std::abs(energy) * bending) + bending * delta);
     result.noise += term->noise(c, r, blur);
   }
   if (!std::isfinite(result.value)) result = {};
@@ -114,6 +125,13 @@ EnergyBudget IncrementalPotential::energyBudget(const State &state, const Config
     budget += of_rod;
   }
   return budget;
+}
+
+double IncrementalPotential::smallestGap(RodSet rods) const {
+  double gap = HUGE_VAL;
+  for (int r = rods.begin; r < rods.end; ++r)
+    for (const auto &term : terms_) gap = std::min(gap, term->smallestGap(iterate_, r));
+  return gap;
 }
 
 double IncrementalPotential::energy(const Configuration &configuration, RodSet rods) const {
@@ -146,7 +164,7 @@ void IncrementalPotential::focus(RodSet rods) {
   focus_ = rods;
   if (dofs_.slots(rods) > workspace_slots_) {
     workspace_slots_ = dofs_.slots(rods);
-    derivatives_ = Derivatives(workspace_slots_);
+    derivatives_ = Derivatives(workspace_slots_, joinsPositions());
   }
   derivatives_.setOrigin(elements_.rods[rods.begin].first_slot);
 }
@@ -155,6 +173,13 @@ const Derivatives &IncrementalPotential::derivatives(RodSet rods) {
   for (int r = rods.begin; r < rods.end; ++r)
     if (known_[r] != Known::all) assembleRod(r, step_.hessian);
   return derivatives_;
+}
+
+double IncrementalPotential::renew(int r) {
+  double change = 0;
+  for (auto &term : terms_) change = std::max(change, term->renew(iterate_, r));
+  known_[r] = Known::nothing;
+  return change;
 }
 
 void IncrementalPotential::addLoads(int r, Derivatives &out) const {
@@ -183,10 +208,20 @@ void IncrementalPotential::setAxialForces(int r, const double *force) {
   known_[r] = Known::nothing;
 }
 
+double IncrementalPotential::freeFraction(const Configuration &from, const Configuration &to, int r) const {
+  double free = 1;
+  for (const auto &term : terms_) free = std::min(free, term->freeFraction(from, to, r));
+  return free;
+}
+
 bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r, RetractionKind kind,
-                                   Configuration &trial) {
+                                   Configuration &trial, double *free) {
   if (trial.empty()) trial = iterate_;
   trial.copyEnds(elements_, r, iterate_);
+  if (obstaclesRemain(r)) {
+    const double now = iterate_.obstacleTime(r), part = std::clamp(scale, 0.0, 1.0);
+    trial.setObstacleTime(r, part == 1 ? step_.time : now + part * (step_.time - now));
+  }
   if (!retraction_.apply(iterate_, increment, scale, r, kind, trial)) return false;
   const RodRange &rod = elements_.rods[r];
   const Energy energy = elements_.energy[r];
@@ -212,7 +247,9 @@ bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r,
         read<Pack>(iterate_[C::strain] + i) + change * inverse * strainSlope<Pack>(energy, length, inverse);
     write(trial[C::axial_force] + i, Pack(force + Pack(scale) * (stiffness * (strain - rest) - force)));
   }
-  return true;
+  const double fraction = freeFraction(iterate_, trial, r);
+  if (free) *free = fraction;
+  return fraction == 1;
 }
 
 bool IncrementalPotential::tryMove(const Planes &increment, double scale, Configuration &trial) {

@@ -35,11 +35,13 @@ bool NewtonSolver::residualFalls(int r, double length, const IncrementalPotentia
 IncrementalPotential::RodEnergy NewtonSolver::tryLength(int r, double length) {
   ++report_.trials;
   (void)PetscLogEventBegin(events().configuration, 0, 0, 0, 0);
-  const bool possible = potential_->tryMove(work_->increment, length, r, work_->trial);
+  double free = 1;
+  const bool possible = potential_->tryMove(work_->increment, length, r, work_->trial, &free);
   (void)PetscLogEventEnd(events().configuration, 0, 0, 0, 0);
   (void)PetscLogEventBegin(events().energy, 0, 0, 0, 0);
-  const IncrementalPotential::RodEnergy energy =
+  IncrementalPotential::RodEnergy energy =
       possible ? potential_->rodEnergy(work_->trial, r) : IncrementalPotential::RodEnergy{};
+  energy.free = free;
   (void)PetscLogEventEnd(events().energy, 0, 0, 0, 0);
   return energy;
 }
@@ -71,6 +73,10 @@ bool NewtonSolver::findLength(int r, const Descent &d, double *lambda, Increment
     const Length length = judgeLength(r, *lambda, d, *there);
     if (length == Length::good) return true;
     (length == Length::too_short ? low : high) = *lambda;
+    if (there->free < 1) { // up to short of what is in the way
+      *lambda *= std::max(0.95 * there->free, 0.2);
+      continue;
+    }
     if (potential_->settings.line_search == LineSearchKind::wolfe && std::isfinite(there->value)) {
       *lambda = std::isfinite(high) ? 0.5 * (low + high) : 2 * *lambda;
       continue;

@@ -165,7 +165,7 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
     Residual &residual = work_->residual[r];
     if (work_->active[r]) { // a rod that has converged takes no part any more
       residual = potential_->residual(r, energyAtIterate(r));
-      work_->moving[r] = moving && dot(rod, work_->motion, work_->motion) > 0;
+      work_->moving[r] = (moving && dot(rod, work_->motion, work_->motion) > 0) || potential_->obstaclesRemain(r);
       finite = finite && residual.isFinite();
       const Verdict verdict = residual.isFinite() && !work_->moving[r] ? judge(r, rtol) : Verdict::going;
       lost = lost || verdict == Verdict::lost;
@@ -309,6 +309,26 @@ PetscErrorCode NewtonSolver::settle(Seek along, Outcome *now) {
   PetscFunctionReturn(0);
 }
 
+/// What terms take for constant, as friction does its normal forces, is taken anew from the answer until that changes
+/// nothing.
+PetscErrorCode NewtonSolver::renew(std::string *failure) {
+  constexpr double little = 1e-3;
+  constexpr int most = 20;
+  PetscFunctionBeginUser;
+  for (int round = 0; failure->empty(); ++round) {
+    double change = 0;
+    for (int r = rods_.begin; r < rods_.end; ++r) change = std::max(change, potential_->renew(r));
+    if (change == 0) break;
+    forgetEnergies();
+    if (round == most)
+      *failure = "friction does not settle: its forces still change by " + shortText(change) + " of themselves";
+    else
+      PetscCall(newton(failure));
+    if (change < little) break;
+  }
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, Seek seek, const Guess *guess,
                                    int patience) {
   PetscFunctionBeginUser;
@@ -320,13 +340,14 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
   Outcome now;
   now.failure = potential_->beyondBarrier();
   if (now.failure.empty()) PetscCall(newton(&now.failure));
+  if (now.failure.empty()) PetscCall(renew(&now.failure));
   if (potential_->step().isStatic()) PetscCall(settleMinimum(seek, &now));
   report_.converged = now.failure.empty();
   for (int r = rods_.begin; r < rods_.end; ++r)
     report_.rounding_error = std::max(report_.rounding_error, work_->left[r]);
   report_.reason = "converged";
   if (!report_.converged) {
-    report_.reason = now.failure + nearBarrier(*potential_, rods_);
+    report_.reason = now.failure + nearBarrier(*potential_, rods_) + nearObstacle(*potential_, rods_);
     if (now.beyond.empty()) // 0.88 of the moment, 0.98 of the force
       report_.reason += limitOfLaw(*potential_, rods_, potential_->start(), 0.5, HUGE_VAL, 0.65);
   }

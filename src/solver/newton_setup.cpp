@@ -92,7 +92,7 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
   if (banded_) // factored straight from the band; every other solver gets a matrix of PETSc's own
     PetscCall(createBandedMatrix(&system_, jacobian_.out()));
   else
-    PetscCall(dofs.createMatrix(jacobian_.out()));
+    PetscCall(dofs.createMatrix(jacobian_.out(), potential.joinsPositions()));
   PetscCall(SNESSetJacobian(snes_, jacobian_, jacobian_, jacobianCallback, this));
   if (type && std::string(type) == MATSOLVERMUMPS) PetscCall(askMumpsForInertia(pc, jacobian_));
   if (!banded_ && (!cholesky || set.end - set.begin > 1)) {

@@ -1,7 +1,8 @@
 #include "tendril/solver/residual.hpp"
 
+#include "tendril/energy/load.hpp"
+
 #include <limits>
-#include <map>
 
 namespace tendril {
 
@@ -10,26 +11,6 @@ using C = Configuration;
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 double edgeError(double reach, double edge) { return epsilon * (1 + epsilon * reach / edge); }
-
-/// Loads on a rod [N]: its weight, and the forces and couples on what is free to move.
-static double loadOn(const Scene &scene, int r, double length) {
-  const Rod &rod = scene.rods[r];
-  double s = rod.gravity ? rod.material.linear_density * length * scene.gravity.norm() : 0;
-  s += rod.material.linear_density * length * length * scene.rotation.angular_velocity.squaredNorm();
-  auto held = [&](int vertex) {
-    return std::any_of(scene.supports.begin(), scene.supports.end(), [&](const Support &support) {
-      return support.rod == r && support.vertex == vertex && support.holdsPosition();
-    });
-  };
-  std::map<int, Vec3> force; // per vertex: forces that cancel are none
-  for (const NodalForce &f : scene.forces)
-    if (f.rod == r) force.try_emplace(f.vertex, Vec3::Zero()).first->second += f.force;
-  for (const auto &[vertex, f] : force)
-    if (!held(vertex)) s += f.norm();
-  for (const EdgeMoment &c : scene.moments)
-    if (c.rod == r) s += (std::abs(c.torque) + c.moment.norm()) / length;
-  return s;
-}
 
 std::vector<RodScale> rodScales(const Scene &scene, const Elements &elements) {
   std::vector<RodScale> scales;
@@ -46,7 +27,7 @@ std::vector<RodScale> rodScales(const Scene &scene, const Elements &elements) {
       for (int k = 0; k < 3; ++k) scale.bending += elements.cells()[cell_stiffness + k][elements.cell_slot[n]];
     for (const int k : elements.constraintsOf(int(r)))
       (scene.constraints[k].isPin() ? scale.pinning : scale.turning) += scene.constraints[k].stiffness;
-    scale.load = loadOn(scene, int(r), scale.length);
+    scale.load = loadScale(scene, int(r), scale.length);
     scales.push_back(scale);
   }
   return scales;

@@ -102,7 +102,7 @@ NewtonSolver::Verdict NewtonSolver::judge(int r, double rtol) {
   const double now = excess(work_->residual[r], rtol);
   work_->left[r] = 0;
   // In dynamics a start guess is no answer, however well it fits: along soft directions it drifts step by step.
-  const bool guess = report_.iterations == 0 && !potential_->step().isStatic() && now > 0;
+  const bool guess = report_.iterations == 0 && spent_ == 0 && !potential_->step().isStatic() && now > 0;
   if (now <= 1 && !guess) return Verdict::answer;
   const bool falls = now < 0.5 * standstill.best, noise = isAtNoise(work_->residual[r], rtol);
   if (!standstill.known || (falls && !noise)) {

@@ -26,6 +26,9 @@ void Configuration::copyEnds(const Elements &elements, int r, const Configuratio
     const int slot = elements.constraint_slot[k];
     copySlots(from, slot, slot + 1);
   }
+  if (from.obstacle_time_.empty()) return;
+  obstacle_time_.resize(from.obstacle_time_.size());
+  obstacle_time_[r] = from.obstacle_time_[r];
 }
 
 void Configuration::copyRod(const Elements &elements, int r, const Configuration &from) {
@@ -87,6 +90,8 @@ void setSupports(const Scene &scene, const Elements &elements, double motion_tim
     if (elements.support_slot[s] >= 0)
       c.setFrame(elements.support_slot[s], supportFrame(scene.supports[s], motion_time));
   setTargets(scene, elements, motion_time, c);
+  if (scene.collidersMove())
+    c.setObstacleTimes(int(elements.rods.size()), motion_time);
 }
 
 void setTarget(const Constraint &constraint, int slot, double motion_time, Configuration &c) {

@@ -76,6 +76,21 @@ def exampleScene(path, value):
         turns = name in ("edge", "tangent", "director", "measure", "angular_velocity")
         scene["constraints"][0]["type"] = "rotation" if turns else "pin"
         put(scene, "constraints[].edge" if turns else "constraints[].vertex", "last")
+    if path.startswith(("colliders", "contact", "rods[].contact")):
+        obstacle = scene.setdefault("colliders", [{}])[0]
+        if not any(shape in obstacle for shape in ("plane", "sphere", "capsule", "cylinder", "box", "tube", "mesh")):
+            obstacle["sphere"] = {"radius": 0.1}
+        put(scene, "colliders[].position", [-1, -1, -1])
+        if "mesh" in obstacle:
+            obstacle["mesh"]["file"] = os.path.abspath(f"{root}/data/meshes/plate.obj")
+            if name == "cell":
+                obstacle["mesh"]["scale"] = 0.1
+        if "tube" in obstacle:
+            put(scene, "rods[].contact", "none")
+        elif path != "rods[].contact":
+            put(scene, "contact.radius" if path.startswith("contact") else "rods[].contact.radius", 0.01)
+        if name in ("threshold", "smoothing"):
+            put(scene, path.rpartition(".")[0] + ".law", "penalty")
     if path.startswith("supports[].motion"):
         scene["supports"][0]["type"] = "clamp"
     if not any(shape in scene.get("rods", [{}])[0] for shape in ("line", "ring", "helix", "points", "file")):

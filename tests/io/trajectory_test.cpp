@@ -129,7 +129,13 @@ TEST(Trajectory, HoldsTheSceneWithItsFilesAndTheOptions) {
 }
 
 TEST(Trajectory, EveryFieldHasAUnitAndAPlace) {
-  const Written written(mixedScene());
+  Scene scene = mixedScene();
+  for (Rod &rod : scene.rods) rod.contact.on = false;
+  Collider &ball = scene.colliders.emplace_back();
+  ball.kind = "sphere";
+  ball.shape = makeSphere(1);
+  ball.motion.velocity = Vec3(1, 0, 0);
+  const Written written(scene);
   for (const std::string &name : TrajectoryWriter::fieldNames()) {
     EXPECT_NE(written.attribute("state/" + name, "unit"), "(none)") << name;
     EXPECT_NE(written.attribute("state/" + name, "place"), "(none)") << name;

@@ -43,9 +43,9 @@ Eigen::RowVectorXd rowOf(const Problem &p, std::vector<std::pair<PetscInt, doubl
 
 /// Fills the blocks with what vertices, edges and cells could put there, and the dense matrix with the same by the
 /// definition of the variables.
-void fill(Problem &p, double diagonal, double spread = 1) {
+void fill(Problem &p, double diagonal, double spread = 1, bool joins = false) {
   Random random(3);
-  p.blocks = EdgeBlocks(p.dofs.slots());
+  p.blocks = EdgeBlocks(p.dofs.slots(), joins);
   p.metric = p.dofs.makePlanes();
   const int n = int(p.dofs.unknowns());
   p.dense = Eigen::MatrixXd::Zero(n, n);
@@ -68,6 +68,11 @@ void fill(Problem &p, double diagonal, double spread = 1) {
       for (int r = 0; r < edge_size; ++r)
         for (int c = 0; c < edge_size; ++c)
           put(EdgeBlocks::across(r, c), i, spread * random(), edge(i - 1, r), edge(i, c), false);
+    for (int i = 0; i < rod.edges && joins; ++i)
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < edge_size; ++c)
+          put(EdgeBlocks::joined(r, c), i, 0.5 * spread * random(), rowOf(p, {{p.dofs.unknown(rod.slot(i), r), 1}}),
+              edge(i, c), false);
     for (int i = 0; i < rod.vertices; ++i)
       for (int r = 0; r < 3; ++r)
         for (int c = r; c < 3; ++c) {
@@ -88,14 +93,14 @@ int negativeEigenvalues(const Eigen::MatrixXd &a) {
   return int((Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(a).eigenvalues().array() < 0).count());
 }
 
-void expectSolvesAndCounts(const std::vector<int> &rods, double diagonal, bool held = true) {
+void expectSolvesAndCounts(const std::vector<int> &rods, double diagonal, bool held = true, bool joins = false) {
   Problem p;
   addRods(p.scene, rods);
   if (held) p.scene.supports = {hold(p.scene, 0, 0, Support::Kind::pin), hold(p.scene, 0, 3, Support::Kind::pin)};
   if (held && p.scene.rods[0].vertices() > 9)
     p.scene.supports.push_back(hold(p.scene, 0, 4, Support::Kind::pin)); // an edge held at both ends
   ASSERT_EQ(p.dofs.setUp(p.scene), PetscErrorCode(0));
-  fill(p, diagonal);
+  fill(p, diagonal, 1, joins);
   BandedWorkspace workspace;
   BandedFactor banded(p.dofs, p.dofs.all(), workspace);
   const Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(p.dense.rows(), -1, 2);
@@ -111,6 +116,15 @@ void expectSolvesAndCounts(const std::vector<int> &rods, double diagonal, bool h
     }
     EXPECT_EQ(negative, negativeEigenvalues(p.dense));
     EXPECT_EQ(zero, 0);
+  }
+}
+
+TEST(Banded, SolvesPositionsJoinedWithEdges) {
+  for (const double diagonal : {14.0, 3.0, -1.0}) {
+    for (const bool held : {false, true}) expectSolvesAndCounts({11}, diagonal, held, true);
+    expectSolvesAndCounts({-10}, diagonal, false, true);
+    expectSolvesAndCounts({-10}, diagonal, true, true);
+    expectSolvesAndCounts(std::vector<int>(2 * lanes, 6), diagonal, false, true);
   }
 }
 

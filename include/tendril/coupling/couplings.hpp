@@ -13,6 +13,8 @@ std::vector<std::unique_ptr<Term>> makeTerms(const Scene &scene, const Elements 
 /// Those of constraints of one kind; null where the scene has none.
 std::unique_ptr<Term> makePins(const Scene &, const Elements &);
 std::unique_ptr<Term> makeRotations(const Scene &, const Elements &);
+/// That of rods with obstacles; null where there are none.
+std::unique_ptr<Term> makeContact(const Scene &, const Elements &);
 
 /// The energies of a state, from the terms of its scene (for tests and single questions: makes them anew).
 EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state,

@@ -93,6 +93,8 @@ private:
     NewtonReport report;
     EnergyBudget energy;
     Work work; ///< statics
+    double obstacle_work = 0; ///< [J]
+    double gap = HUGE_VAL;    ///< smallest between surfaces in contact [m]
     StepError error;
     bool too_coarse = false; ///< for the error asked for
     void commit(const IncrementalPotential &potential, RodSet rods, State *next);

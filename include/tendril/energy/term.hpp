@@ -36,7 +36,8 @@ struct Step {
 struct Derivatives {
   Planes gradient, equilibrium;
   EdgeBlocks blocks; ///< of the Hessian, over edge variables
-  explicit Derivatives(int slots) : gradient(slot_size, slots), equilibrium(slot_size, slots), blocks(slots) {}
+  explicit Derivatives(int slots, bool joins = false)
+      : gradient(slot_size, slots), equilibrium(slot_size, slots), blocks(slots, joins) {}
   void setOrigin(int first_slot) {
     gradient.setOrigin(first_slot);
     equilibrium.setOrigin(first_slot);
@@ -46,8 +47,8 @@ struct Derivatives {
 
 /// Stored and kinetic energies of a state, by name [J]; centrifugal potential counts as gravity.
 struct EnergyBudget {
-  double kinetic = 0, stretch = 0, bend = 0, twist = 0, gravity = 0, constraint = 0;
-  double total() const { return kinetic + stretch + bend + twist + gravity + constraint; }
+  double kinetic = 0, stretch = 0, bend = 0, twist = 0, gravity = 0, constraint = 0, contact = 0;
+  double total() const { return kinetic + stretch + bend + twist + gravity + constraint + contact; }
   EnergyBudget &operator+=(const EnergyBudget &other);
 };
 class Term {
@@ -65,6 +66,8 @@ public:
   /// Whether its Hessian couples the coordinates of one vertex other than through edges: see
   /// BandedSystem::coupled_positions.
   virtual bool couplesPositions() const { return false; }
+  /// Whether its Hessian couples the position of a vertex with the edge behind it.
+  virtual bool joinsPositions() const { return false; }
   /// [J], up to a constant of the step. Not finite where the configuration is impossible.
   virtual double energy(const Configuration &configuration, int rod) const = 0;
   /// Adds gradient and Hessian, pulled back by the retraction at the configuration.
@@ -73,6 +76,26 @@ public:
   /// Adds what of it a state stores, without dissipation, under its names.
   virtual void addEnergies(const State & /*state*/, const Configuration & /*of the state*/, double /*load_factor*/,
                            int /*rod*/, EnergyBudget & /*out*/) const {}
+  /// Whether it is an energy of strains, whose rounding is that of edges.
+  virtual bool roundsAsStrains() const { return true; }
+  /// Part of the straight way between two configurations that a rod can go, 1 where nothing is in its way.
+  virtual double freeFraction(const Configuration & /*from*/, const Configuration & /*to*/, int /*rod*/) const {
+    return 1;
+  }
+  /// Smallest distance between the surfaces of a rod and of obstacles [m]; infinite where there are none.
+  virtual double smallestGap(const Configuration & /*configuration*/, int /*rod*/) const { return HUGE_VAL; }
+  /// Adds by how much its gradient changes when obstacles go on to a time and the rod stays, to first order.
+  virtual void addObstacleMotion(const Configuration & /*iterate*/, double /*time*/, int /*rod*/,
+                                 Planes & /*out*/) const {}
+  /// Work that obstacles do on a rod when they go from one time to another, by the forces at a configuration [J].
+  virtual double workOfObstacles(const Configuration & /*configuration*/, double /*from*/, double /*to*/,
+                                 int /*rod*/) const {
+    return 0;
+  }
+  /// Takes what it took from before for constant anew from the iterate. \return by which part that changes its forces
+  virtual double renew(const Configuration & /*iterate*/, int /*rod*/) { return 0; }
+  /// What a state remembers of it beside the configuration, after the step.
+  virtual void commit(State & /*state*/, int /*rod*/) const {}
   /// How far rounding blurs the energy, beyond that of its value and of strains [J]. \param blur of an edge over its
   /// length
   virtual double noise(const Configuration & /*configuration*/, int /*rod*/, double /*blur*/) const { return 0; }

@@ -15,6 +15,8 @@ void readSupport(const YamlValue &value, SceneFile &out);
 void readConstraint(const YamlValue &value, SceneFile &out);
 void readLoad(const YamlValue &value, SceneFile &out);
 
+/// A name of one line.
+std::string readName(const YamlValue &value);
 /// Rods that a block speaks of: a name, a number, or `all`.
 std::vector<int> readTargets(YamlMap &map, KeyOf<KeyType::rod> key, const RodNames &rods);
 /// \param count of vertices or edges of the rod

@@ -78,6 +78,7 @@ private:
   void writeRods();
   void writeSupports();
   void writeConstraints(); ///< name, type, rod, and the vertex of a pin or edge of a rotation
+  void writeColliders();   ///< name, shape, its parameters, and position and rotation without motion
   void writeMaterials();
   std::string xdmfFrame(bool edges) const;
   void writeXdmf() const;

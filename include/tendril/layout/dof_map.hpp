@@ -34,7 +34,8 @@ public:
 
   DM dm() const { return dm_; }
   /// Matrix of PETSc's own type over the unknowns, preallocated for the blocks of every rod.
-  PetscErrorCode createMatrix(Mat *matrix);
+  /// \param joins as EdgeBlocks::joins
+  PetscErrorCode createMatrix(Mat *matrix, bool joins = false);
   /// Puts the blocks of all rods into the matrix, both triangles.
   PetscErrorCode fillMatrix(const EdgeBlocks &blocks, Mat matrix);
 

@@ -13,9 +13,11 @@ namespace tendril {
 inline constexpr int edge_size = 4, edge_pairs = edge_size * (edge_size + 1) / 2;
 /// Numbers of a slot: edge i with itself (10), edge i - 1 with edge i (16), the position of vertex i with itself (6).
 inline constexpr int slot_entries = edge_pairs + edge_size * edge_size + 6;
+/// With the position of vertex i and edge i (12), which only what acts beside the axis of a rod has.
+inline constexpr int joined_entries = slot_entries + 3 * edge_size;
 
-/// The 32 entries of a slot are planes over the slots of a rod. Behind a ring, the copy of its first slot holds what
-/// the last edge has with the first; the other copies are added to what they stand for (fold).
+/// The 32 or 44 entries of a slot are planes over the slots of a rod. Behind a ring, the copy of its first slot holds
+/// what the last edge has with the first; the other copies are added to what they stand for (fold).
 class EdgeBlocks {
 public:
   /// Planes of a slot's entries. Edge variables r, c in 0..3: e_x, e_y, e_z, twist.
@@ -26,10 +28,17 @@ public:
   static constexpr int vertex(int r, int c) {
     return edge_pairs + edge_size * edge_size + r * 3 - r * (r - 1) / 2 + (c - r);
   } ///< r <= c < 3
+  static constexpr int joined(int r, int c) {
+    return slot_entries + edge_size * r + c;
+  } ///< r < 3 of the position of the vertex, c of the edge behind it
 
   EdgeBlocks() = default;
   /// Of all rods, or of as many neighbours as so many slots hold.
-  explicit EdgeBlocks(int slots) : data_(std::size_t(slot_entries) * slots + 4 * lanes, 0.0) {}
+  /// \param joins whether positions have entries with edges
+  explicit EdgeBlocks(int slots, bool joins = false)
+      : entries_(joins ? joined_entries : slot_entries), data_(std::size_t(entries_) * slots + 4 * lanes, 0.0) {}
+  bool joins() const { return entries_ == joined_entries; }
+  int entries() const { return entries_; }
   /// Moves the window to the rods from this slot on (see Planes).
   void setOrigin(int first_slot) { origin_ = first_slot; }
   double *entry(const RodRange &rod, int plane) { return data_.data() + offset(rod, plane); }
@@ -50,11 +59,11 @@ public:
 
   /// Where the plane of an entry begins in data().
   std::size_t offset(const RodRange &rod, int plane) const {
-    return lanes + std::size_t(slot_entries) * (rod.first_slot - origin_) + std::size_t(plane) * rod.slots;
+    return lanes + std::size_t(entries_) * (rod.first_slot - origin_) + std::size_t(plane) * rod.slots;
   }
 
 private:
-  int origin_ = 0;
+  int origin_ = 0, entries_ = slot_entries;
   AlignedVector data_;
 };
 
@@ -62,14 +71,15 @@ private:
 class BlockPlanes {
 public:
   BlockPlanes(EdgeBlocks &blocks, const RodRange &rod) {
-    for (int k = 0; k < slot_entries; ++k) plane_[k] = blocks.entry(rod, k) - rod.first_slot;
+    for (int k = 0; k < blocks.entries(); ++k) plane_[k] = blocks.entry(rod, k) - rod.first_slot;
   }
   double *own(int r, int c) const { return plane_[EdgeBlocks::own(r, c)]; }
   double *across(int r, int c) const { return plane_[EdgeBlocks::across(r, c)]; }
   double *vertex(int r, int c) const { return plane_[EdgeBlocks::vertex(r, c)]; }
+  double *joined(int r, int c) const { return plane_[EdgeBlocks::joined(r, c)]; }
 
 private:
-  std::array<double *, slot_entries> plane_;
+  std::array<double *, joined_entries> plane_;
 };
 
 } // namespace tendril

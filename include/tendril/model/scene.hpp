@@ -3,6 +3,7 @@
 /// The scene: all that is fixed once set-up is done. Rods, what holds them, what pulls on them. Nothing here changes
 /// during a run.
 
+#include "tendril/model/contact.hpp"
 #include "tendril/model/material.hpp"
 #include "tendril/model/strain.hpp"
 
@@ -30,6 +31,7 @@ struct Rod {
   Measure measure = Measure::tan;
   Energy energy = Energy::seed;
   bool gravity = true;
+  ContactSettings contact;
   /// Natural curvature about the two directors and twist (each [1/m]) where the rod is not stress-free as drawn.
   enum class Natural { as_drawn, given } natural = Natural::as_drawn;
   Vec3 natural_strain = Vec3::Zero(); ///< (curvature 1, curvature 2, twist) for Natural::given; zero is a straight rod
@@ -47,31 +49,6 @@ struct Rod {
   /// way.
   int edgeBefore(int vertex) const { return vertex > 0 ? vertex - 1 : closed ? edges() - 1 : -1; }
   int edgeAfter(int vertex) const { return vertex < edges() ? vertex : -1; }
-};
-
-/// How a held thing moves: displacement and rotation vector, both from the reference, by constant velocities or by a
-/// table, linear between its rows and at rest before the first and after the last.
-struct Motion {
-  struct Key {
-    double time;       ///< [s]
-    Vec3 displacement; ///< [m]
-    Vec3 rotation;     ///< rotation vector about the vertex [rad]
-    bool operator==(const Key &) const = default;
-  };
-  Vec3 velocity = Vec3::Zero();         ///< [m/s]
-  Vec3 angular_velocity = Vec3::Zero(); ///< about the vertex [rad/s]
-  std::vector<Key> table;               ///< in order of time; used instead of the velocities when not empty
-
-  bool operator==(const Motion &) const = default;
-  bool moves() const { return !table.empty() || !velocity.isZero(0) || !angular_velocity.isZero(0); }
-  Vec3 displacementAt(double time) const;
-  Vec3 velocityAt(double time) const;       ///< where it jumps, that before [m/s]
-  Vec3 rotationVectorAt(double time) const; ///< [rad]
-  Mat3 rotationAt(double time) const;
-  Vec3 angularVelocityAt(double time) const; ///< where it jumps, that before [rad/s]
-  /// Sum of the rotation vectors of its parts between two times, each of less than half a radian: whole turns are
-  /// counted [rad].
-  Vec3 turnBetween(double from, double to) const;
 };
 
 /// What holds a vertex. `clamp` holds its position, tangent and director by half cells to a fixed frame; `pin` its
@@ -137,6 +114,7 @@ struct Scene {
   std::vector<Constraint> constraints;
   std::vector<NodalForce> forces;
   std::vector<EdgeMoment> moments;
+  std::vector<Collider> colliders;
   Vec3 gravity{0, -9.81, 0}; ///< [m/s^2]
   /// Statics in a frame that turns about an axis through `centre`: the scene is at rest there, under centrifugal
   /// forces.
@@ -151,6 +129,9 @@ struct Scene {
 
   /// Whether anything dissipates by the rate of its strains: the stiffness of a rod, or a constraint.
   bool strainsDissipate() const;
+  bool collidersMove() const;
+  /// Whether a rod may touch anything.
+  bool touches(int rod) const { return !colliders.empty() && rods[rod].contact.on; }
 };
 
 /// Fills the directors of a rod with discrete Bishop frames: `start` (or some normal of the first edge when zero)

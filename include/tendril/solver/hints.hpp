@@ -11,6 +11,9 @@ namespace tendril {
 /// A hint for failures next to an angle of 180 degrees between neighbouring edges, where energies grow without bound.
 std::string nearBarrier(const IncrementalPotential &potential, RodSet rods);
 
+/// On the first rod that is pressed hard against an obstacle.
+std::string nearObstacle(const IncrementalPotential &potential, RodSet rods);
+
 /// Words on a rod of the energy `seed` that is near a limit of its law, or beyond: of bending, more sharply than
 /// `sharpest` (in units of the limit) with edges shorter than `longest`, or of compression with an edge shorter than
 /// `shortest`; the force is largest, EA r (1 - r^2)/2 = 0.192 EA, where the stretch r obeys r^2 = 1/3.

@@ -64,10 +64,14 @@ public:
     double value = std::numeric_limits<double>::infinity(), noise = 0;
     double size = 0;                 ///< sum of the energies of all terms without their signs [J]
     double reach = 0, steepness = 1; ///< largest coordinate [m]; how much stiffer than at rest the steepest cell is
+    double free = 1;                 ///< of a trial: part of the straight way to it on which no obstacle is
   };
   RodEnergy rodEnergy(const Configuration &configuration, int rod) const;
   /// What a state of some rods stores, term by term. \param configuration that of the state
-  EnergyBudget energyBudget(const State &state, const Configuration &configuration, double load_factor, RodSet rods) const;
+  EnergyBudget energyBudget(const State &state, const Configuration &configuration, double load_factor,
+                            RodSet rods) const;
+  /// Smallest distance between surfaces of some rods and obstacles at the iterate [m].
+  double smallestGap(RodSet rods) const;
   double energy(const Configuration &configuration, RodSet rods) const;
   double energy(const Configuration &configuration) const { return energy(configuration, all()); }
   /// Room for the derivatives of some rods; those of others are forgotten. Derivatives of other rods need room for all.
@@ -76,6 +80,8 @@ public:
   const Derivatives &derivatives(RodSet rods);
   /// The same without the Hessian where it is not known yet.
   const Derivatives &gradient(int rod);
+  /// See Term::renew.
+  double renew(int rod);
   /// Adds the gradient of the loads on a rod.
   void addLoads(int rod, Derivatives &out) const;
   /// Of all rods, with room for them.
@@ -89,13 +95,33 @@ public:
   bool couplesPositions() const {
     return std::any_of(terms_.begin(), terms_.end(), [](const auto &term) { return term->couplesPositions(); });
   }
+  /// Whether any couples positions with edges.
+  bool joinsPositions() const {
+    return std::any_of(terms_.begin(), terms_.end(), [](const auto &term) { return term->joinsPositions(); });
+  }
   const EdgeBlocks &blocks() const { return derivatives_.blocks; }
 
-  /// Trial configuration R(iterate, scale x increment) of one rod, with its axial forces; false when impossible.
-  bool tryMove(const Planes &increment, double scale, int rod, RetractionKind kind, Configuration &trial);
-  bool tryMove(const Planes &increment, double scale, int rod, Configuration &trial) {
-    return tryMove(increment, scale, rod, settings.retraction, trial);
+  /// Trial configuration R(iterate, scale x increment) of one rod, with its axial forces; obstacles that move go the
+  /// same part of their way. False when it is impossible, or when something is in the way.
+  /// \param free receives the part of the straight way from the iterate on which nothing is
+  bool tryMove(const Planes &increment, double scale, int rod, RetractionKind kind, Configuration &trial,
+               double *free = nullptr);
+  bool tryMove(const Planes &increment, double scale, int rod, Configuration &trial, double *free = nullptr) {
+    return tryMove(increment, scale, rod, settings.retraction, trial, free);
   }
+  /// Adds what their way to those does to the gradient, to first order.
+  void addObstacleMotion(int rod, Planes &out) const {
+    for (const auto &term : terms_) term->addObstacleMotion(iterate_, step_.time, rod, out);
+  }
+  /// Work of obstacles that move on some rods since the step began, by the forces at the iterate [J].
+  double workOfObstacles(RodSet rods) const {
+    double work = 0;
+    for (int r = rods.begin; r < rods.end && obstacles_move_; ++r)
+      for (const auto &term : terms_) work += term->workOfObstacles(iterate_, start_time_, step_.time, r);
+    return work;
+  }
+  /// Whether obstacles have not reached their places at the end of the step.
+  bool obstaclesRemain(int rod) const { return obstacles_move_ && iterate_.obstacleTime(rod) != step_.time; }
   /// The same for all rods.
   bool tryMove(const Planes &increment, double scale, Configuration &trial);
   /// Makes the trial of one rod, or of all, the iterate.
@@ -146,6 +172,8 @@ public:
   /// State of some rods after the step: positions, directors made orthonormal, axial forces.
   void commitConfiguration(State &state, RodSet rods) const {
     tendril::commitConfiguration(elements_, iterate_, rods, state);
+    for (const auto &term : terms_)
+      for (int r = rods.begin; r < rods.end; ++r) term->commit(state, r);
   }
   /// Of all, with the time; in steps in time the velocities are those of the stage.
   void commit(State &state) const;
@@ -171,6 +199,10 @@ private:
   std::vector<Known> known_; ///< per rod: what derivatives_ holds of the iterate
   std::vector<RodScale> scales_;
 
+  bool obstacles_move_;
+
+  void moveObstacles(int rod);
+  double freeFraction(const Configuration &from, const Configuration &to, int rod) const;
   double reachOf(const Configuration &configuration, const RodRange &rod) const;
   double steepnessOf(const Configuration &configuration, int rod) const;
 };

@@ -172,6 +172,7 @@ private:
   PetscErrorCode settleNeutral(bool first, bool creeps, Seek seek, Outcome *now);
   PetscErrorCode settleMinimum(Seek seek, Outcome *now);
   PetscErrorCode newton(std::string *failure);
+  PetscErrorCode renew(std::string *failure);
   PetscErrorCode moveTo(Vec x, bool *possible);
   PetscErrorCode writeIterate(Vec x);
   KSP factored() const;

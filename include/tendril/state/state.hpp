@@ -36,6 +36,8 @@ struct State {
   /// What supports and constraints that move did at the end of the last step, then of the one before (HolderActions);
   /// where the integrator wants them.
   std::vector<Vec3> support_actions;
+  /// Stiffness of the barrier between each rod and obstacles in the last step; where there are obstacles [N/m].
+  std::vector<double> contact_stiffness;
 
   bool operator==(const State &) const = default;
 };
@@ -103,11 +105,16 @@ public:
   /// Moves the window (see Planes).
   void setOrigin(int first_slot) { values_.setOrigin(first_slot); }
   bool empty() const { return values_.size() == 0; }
+  /// Time at which obstacles stand for a rod, where any moves [s].
+  double obstacleTime(int rod) const { return obstacle_time_.empty() ? 0 : obstacle_time_[rod]; }
+  void setObstacleTime(int rod, double time) { obstacle_time_[rod] = time; }
+  void setObstacleTimes(int rods, double time) { obstacle_time_.assign(rods, time); }
   /// Frames of the first edge of a ring, and positions of its first two vertices, behind its last.
   void closeRing(const RodRange &rod);
 
 private:
   Planes values_;
+  std::vector<double> obstacle_time_; ///< per rod
   void copySlots(const Configuration &from, int begin, int end);
 };
 

@@ -1,0 +1,49 @@
+#pragma once
+/// \file friction.hpp
+/// Friction and damping of samples in contact. The normal force, the normal and the point of the surface that slides
+/// are taken from an earlier iterate, so that what is left has a potential (Li et al. 2020, Incremental potential
+/// contact, 5).
+
+#include "tendril/contact/contact.hpp"
+#include "tendril/energy/term.hpp"
+#include "tendril/geometry/rotation.hpp"
+
+namespace tendril {
+
+/// A sample that slides. Its point of the rod's surface is carried by the frame of its edge, which friction turns.
+struct SlidingPoint {
+  int slot, point, collider;   ///< of its edge; of samplePoints; of the scene
+  double at;                   ///< part of the edge
+  double pressing;             ///< normal force [N]
+  double coefficient;          ///< of friction
+  Vec3 normal = Vec3::Zero();  ///< out of the obstacle, in the axes of the world
+  Vec3 arm = Vec3::Zero();     ///< from the axis of the rod, along tangent and both directors of the edge [m]
+  Vec3 touched = Vec3::Zero(); ///< point of the obstacle, in its axes [m]
+  Vec3 start = Vec3::Zero();   ///< from that point to the rod's when the step began, in the axes of the world [m]
+};
+
+/// Over what points slide in a step.
+struct Sliding {
+  double fall_off; ///< way below which friction falls off to zero [m]
+  double time;     ///< that the step has taken; 0 in statics [s]
+};
+
+/// Derivatives by the place of the point.
+struct SlidingForce {
+  double value = 0; ///< [J]
+  Vec3 gradient = Vec3::Zero();
+  Mat3 hessian = Mat3::Zero();
+};
+/// Of a way u: normal force times coefficient times rho(|u across the normal|), which is u^2/a - u^3/(3 a^2) up to the
+/// fall-off a and u - a/3 beyond; and with dampings of the contact, that force times damping/2 u^2 over the time.
+SlidingForce slidingForce(const SlidingPoint &point, const ContactSettings &settings, const Sliding &sliding,
+                          const Vec3 &way);
+
+/// The way of a point since the step began, relative to the obstacle.
+Vec3 wayOf(const SlidingPoint &point, const Configuration &c, const Collider::Pose &pose);
+
+/// Adds what a point does to the derivatives of its rod. \param blocks or null
+void addSliding(const SlidingPoint &point, const SlidingForce &force, const Configuration &c, const BlockPlanes *blocks,
+                Derivatives &out);
+
+} // namespace tendril

@@ -1,0 +1,96 @@
+#pragma once
+/// \file obstacles.hpp
+/// Samples of rods against the obstacles of a scene: where they are near, their distances, and how far a motion is
+/// free. docs/theory.md, Contact.
+
+#include "tendril/contact/law.hpp"
+#include "tendril/state/state.hpp"
+
+namespace tendril {
+
+/// A point of an edge with its part of the edge's length.
+struct SamplePoint {
+  double at, weight;
+};
+/// Points of an edge: Gauss points, or, by themselves, both vertices and as many points between, all apart alike, as
+/// keep `spacing`.
+std::vector<SamplePoint> samplePoints(int quadrature, double longest_edge, double spacing);
+
+/// Some samples of one rod against one obstacle, with distances between surfaces [m].
+struct Samples {
+  static constexpr int most = 128;
+  int count = 0;
+  std::array<int, most> slot;  ///< of their edges
+  std::array<int, most> point; ///< of samplePoints
+  std::array<double, most> distance;
+  std::array<std::array<double, most>, 3> local; ///< in the axes of the obstacle
+  Collider::Pose pose;
+  int collider, chunk, first; ///< which these are
+};
+
+/// What one rod may touch. Edges are looked at in chunks: one that moves less than it was away last is left out.
+class RodContacts {
+public:
+  RodContacts(const Scene &scene, const Elements &elements, int rod);
+
+  /// Notes how far every chunk is from every obstacle. \param all of them, or those that have moved since
+  void look(const Configuration &c, bool all);
+  /// Calls visit(Samples &) for those samples that may be nearer than the reach of the law. \param also another
+  /// configuration in which samples may be near, or null
+  template <class Visit> void visitNear(const Configuration &c, const Configuration *also, Visit visit) const;
+  /// Part of the straight way from one configuration to another on which no sample passes the wall of its law: 1 where
+  /// all of it is free. Conservative advancement (Li et al. 2021, Codimensional incremental potential contact, 4.2).
+  double freeFraction(const Configuration &from, const Configuration &to) const;
+
+  /// Smallest distance of samples from obstacles, between surfaces [m].
+  double smallestGap(const Configuration &c) const;
+
+  const NormalLaw &law() const { return law_; }
+  /// Of a barrier [N/m].
+  void setStiffness(double stiffness) { law_ = {settings_, stiffness}; }
+  const std::vector<SamplePoint> &points(int collider) const { return points_[collider]; }
+  /// Weight of a sample: its part of the rod at rest [m].
+  double weight(const Samples &samples, int k) const {
+    return points_[samples.collider][samples.point[k]].weight * elements_.restLength()[samples.slot[k]];
+  }
+
+private:
+  static constexpr int chunk_edges = 16;
+  const Scene &scene_;
+  const Elements &elements_;
+  const ContactSettings &settings_;
+  const RodRange &rod_;
+  const int index_;
+  NormalLaw law_;
+  std::vector<std::vector<SamplePoint>> points_; ///< per collider
+  std::vector<double> away_;          ///< per chunk and collider: no sample reaches an obstacle that moves less [m]
+  std::vector<double> nearest_;       ///< per chunk: the least of these
+  std::array<AlignedVector, 3> seen_; ///< vertices where they were then [m]
+  double seen_time_ = 0;              ///< obstacles where they were then [s]
+
+  int chunks() const { return (rod_.edges + chunk_edges - 1) / chunk_edges; }
+  double movedSince(const Configuration &c, int chunk) const;
+  Samples samplesOf(const Configuration &c, int chunk, int collider, int first) const;
+};
+
+template <class Visit>
+void RodContacts::visitNear(const Configuration &c, const Configuration *also, Visit visit) const {
+  const int colliders = int(scene_.colliders.size());
+  auto stood = [&](const Configuration &x) { return x.obstacleTime(index_) == seen_time_; };
+  const bool all_stood = stood(c) && (!also || stood(*also));
+  for (int chunk = 0; chunk < chunks(); ++chunk) {
+    const double moved = std::max(movedSince(c, chunk), also ? movedSince(*also, chunk) : 0);
+    if (all_stood && moved < nearest_[chunk]) continue;
+    const int edges = std::min(chunk_edges, rod_.edges - chunk * chunk_edges);
+    for (int k = 0; k < colliders; ++k) {
+      const bool still = all_stood || !scene_.colliders[k].motion.moves();
+      if (still && moved < away_[chunk * colliders + k]) continue;
+      for (int first = 0; first < edges * int(points_[k].size()); first += Samples::most) {
+        Samples samples = samplesOf(c, chunk, k, first);
+        visit(samples);
+      }
+    }
+  }
+}
+
+} // namespace tendril

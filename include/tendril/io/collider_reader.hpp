@@ -1,0 +1,17 @@
+#pragma once
+/// \file collider_reader.hpp
+/// Obstacles, and how rods touch them. \throws SceneError
+
+#include "tendril/io/yaml.hpp"
+
+namespace tendril {
+
+/// The block of the scene; what it does not say is NaN.
+ContactSettings readContact(YamlMap &scene);
+/// What the block of a rod says.
+void readContact(YamlMap &rod, ContactSettings &settings);
+void readCollider(const YamlValue &value, Scene &scene);
+/// What no key says. \param colliders for messages
+void completeContact(const YamlValue &colliders, Scene &scene);
+
+} // namespace tendril

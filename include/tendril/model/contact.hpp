@@ -1,0 +1,67 @@
+#pragma once
+/// \file contact.hpp
+/// Obstacles that rods touch, and how they do.
+
+#include "tendril/geometry/mesh_distance.hpp"
+#include "tendril/model/motion.hpp"
+
+#include <memory>
+#include <string>
+
+namespace tendril {
+
+/// How a rod touches obstacles.
+struct ContactSettings {
+  /// `barrier`: surfaces keep a distance between - distance/2 and distance/2, whatever the load. `penalty`: a spring,
+  /// which gives way.
+  enum class Law { barrier, penalty };
+  bool on = true;
+  Law law = Law::barrier;
+  double radius = 0;   ///< of the rod [m]
+  double distance = 0; ///< width of the barrier [m]
+  /// Of a barrier: force per length [N/m], 0: by the loads. Of a penalty: pressure over depth, per length of the rod
+  /// [N/m^2].
+  double stiffness = 0;
+  double threshold = 1e-3;         ///< of a penalty: distance at which it begins [m]
+  double smoothing = 5e-3;         ///< of a penalty: half of the depth over which its stiffness rises [m]
+  double friction = 0;             ///< coefficient of Coulomb's law
+  double fall_off_velocity = 0.01; ///< below which friction falls off to zero [m/s]
+  double slip_length = 0;          ///< in statics the same of the way since the last load step [m]
+  bool friction_at_surface = true; ///< or at the axis, where it turns nothing
+  double tangential_damping = 0, normal_damping = 0; ///< of the normal force by the velocity [s/m]
+  int quadrature = 0; ///< Gauss points of an edge; 0: vertices, and points between where obstacles curve
+
+  bool isBarrier() const { return law == Law::barrier; }
+  /// Distance between surfaces that no motion passes [m].
+  double wall() const {
+    return isBarrier() ? -0.5 * distance : radius > 0 ? -0.8 * radius : -std::numeric_limits<double>::infinity();
+  }
+  bool slides() const { return friction > 0 || tangential_damping > 0 || normal_damping > 0; }
+  bool operator==(const ContactSettings &) const = default;
+};
+
+/// An obstacle: a solid that stands or moves as it is told.
+struct Collider {
+  std::string name;
+  std::string kind;                   ///< of its shape, as scenes have it
+  Vec3 size = Vec3::Zero();           ///< of its shape: radius and length; bore, outer radius and length; edges [m]
+  std::shared_ptr<const Shape> shape; ///< about its own origin
+  std::shared_ptr<const TriangleMesh> mesh = nullptr; ///< of which it was made, or null
+  Vec3 position = Vec3::Zero();                       ///< of that origin, without its motion [m]
+  Mat3 rotation = Mat3::Identity();                   ///< from its own axes to the world's, without its motion
+  Motion motion;
+  double friction = -1; ///< coefficient; negative: that of the rod. Of both the geometric mean counts
+
+  /// Place of the origin and axes at a time.
+  struct Pose {
+    Mat3 rotation;
+    Vec3 position;
+    Vec3 toLocal(const Vec3 &x) const { return rotation.transpose() * (x - position); }
+    Vec3 fromLocal(const Vec3 &x) const { return rotation * x + position; }
+  };
+  Pose poseAt(double time) const {
+    return {motion.rotationAt(time) * rotation, position + motion.displacementAt(time)};
+  }
+};
+
+} // namespace tendril

@@ -1,0 +1,36 @@
+#pragma once
+/// \file motion.hpp
+/// Prescribed motions.
+
+#include "tendril/geometry/frame.hpp"
+
+#include <vector>
+
+namespace tendril {
+
+/// How a held thing moves: displacement and rotation vector, both from the reference, by constant velocities or by a
+/// table, linear between its rows and at rest before the first and after the last.
+struct Motion {
+  struct Key {
+    double time;       ///< [s]
+    Vec3 displacement; ///< [m]
+    Vec3 rotation;     ///< rotation vector about the vertex [rad]
+    bool operator==(const Key &) const = default;
+  };
+  Vec3 velocity = Vec3::Zero();         ///< [m/s]
+  Vec3 angular_velocity = Vec3::Zero(); ///< about the vertex [rad/s]
+  std::vector<Key> table;               ///< in order of time; used instead of the velocities when not empty
+
+  bool operator==(const Motion &) const = default;
+  bool moves() const { return !table.empty() || !velocity.isZero(0) || !angular_velocity.isZero(0); }
+  Vec3 displacementAt(double time) const;
+  Vec3 velocityAt(double time) const;       ///< where it jumps, that before [m/s]
+  Vec3 rotationVectorAt(double time) const; ///< [rad]
+  Mat3 rotationAt(double time) const;
+  Vec3 angularVelocityAt(double time) const; ///< where it jumps, that before [rad/s]
+  /// Sum of the rotation vectors of its parts between two times, each of less than half a radian: whole turns are
+  /// counted [rad].
+  Vec3 turnBetween(double from, double to) const;
+};
+
+} // namespace tendril

@@ -1,0 +1,174 @@
+#include "tendril/contact/obstacles.hpp"
+
+#include <algorithm>
+
+namespace tendril {
+
+using C = Configuration;
+
+std::vector<SamplePoint> samplePoints(int quadrature, double longest_edge, double spacing) {
+  const double outer = 0.5 * std::sqrt(0.6), middle = 0.5 / std::sqrt(3.0);
+  if (quadrature == 1) return {{0.5, 1}};
+  if (quadrature == 2) return {{0.5 - middle, 0.5}, {0.5 + middle, 0.5}};
+  if (quadrature == 3) return {{0.5 - outer, 5.0 / 18}, {0.5, 4.0 / 9}, {0.5 + outer, 5.0 / 18}};
+  constexpr double most = 64;
+  const int parts = int(std::clamp(std::ceil(longest_edge / spacing), 1.0, most));
+  std::vector<SamplePoint> points;
+  for (int k = 0; k <= parts; ++k) points.push_back({double(k) / parts, (k == 0 || k == parts ? 0.5 : 1.0) / parts});
+  return points;
+}
+
+RodContacts::RodContacts(const Scene &scene, const Elements &elements, int rod)
+    : scene_(scene), elements_(elements), settings_(scene.rods[rod].contact), rod_(elements.rods[rod]), index_(rod),
+      law_(settings_, settings_.stiffness), away_(chunks() * scene.colliders.size(), 0), nearest_(chunks(), 0) {
+  double longest = 0;
+  for (int s = rod_.first_slot; s < rod_.edgeEnd(); ++s) longest = std::max(longest, elements.restLength()[s]);
+  // A tube of this radius against a surface that curves as much touches it along about twice this length.
+  for (const Collider &collider : scene.colliders)
+    points_.push_back(
+        samplePoints(settings_.quadrature, longest,
+                     0.56 * std::sqrt(2 * (collider.shape->curvatureRadius() + settings_.radius) * 2 * law_.reach())));
+  for (AlignedVector &x : seen_) x.assign(rod_.edges + 1 + lanes, 0.0);
+}
+
+double RodContacts::movedSince(const Configuration &c, int chunk) const {
+  const int begin = chunk * chunk_edges, end = std::min(begin + chunk_edges, rod_.edges);
+  Pack most(0.0);
+  for (int i = begin; i <= end; i += lanes) {
+    Pack sum(0.0);
+    for (int a = 0; a < 3; ++a) {
+      const Pack d = read<Pack>(c[C::Plane(C::position + a)] + rod_.slot(i)) - read<Pack>(seen_[a].data() + i);
+      sum += d * d;
+    }
+    most = max(most, end - i + 1 < lanes ? select(firstLanes(end - i + 1), sum, Pack(0.0)) : sum);
+  }
+  return std::sqrt(hmax(most));
+}
+
+void RodContacts::look(const Configuration &c, bool all) {
+  const int colliders = int(scene_.colliders.size());
+  const double time = c.obstacleTime(index_);
+  all = all || time != seen_time_;
+  seen_time_ = time;
+  for (int chunk = 0; chunk < chunks(); ++chunk) {
+    if (!all && movedSince(c, chunk) <= 0.5 * nearest_[chunk]) continue;
+    const int begin = chunk * chunk_edges, count = std::min(chunk_edges, rod_.edges - begin) + 1;
+    double longest = 0;
+    for (int i = begin; i < begin + count; ++i) {
+      const Vec3 x = c.positionAt(rod_.slot(i));
+      for (int a = 0; a < 3; ++a) seen_[a][i] = x[a];
+      if (i + 1 < begin + count) longest = std::max(longest, c[C::length][rod_.slot(i)]);
+    }
+    nearest_[chunk] = HUGE_VAL;
+    for (int k = 0; k < colliders; ++k) {
+      const Collider::Pose pose = scene_.colliders[k].poseAt(time);
+      std::array<std::array<double, chunk_edges + 1>, 3> local;
+      std::array<double, chunk_edges + 1> distance;
+      for (int i = 0; i < count; ++i) {
+        const Vec3 x = pose.toLocal(Vec3(seen_[0][begin + i], seen_[1][begin + i], seen_[2][begin + i]));
+        for (int a = 0; a < 3; ++a) local[a][i] = x[a];
+      }
+      const double *const points[3] = {local[0].data(), local[1].data(), local[2].data()};
+      scene_.colliders[k].shape->distances(points, count, distance.data());
+      const double least = *std::min_element(distance.begin(), distance.begin() + count);
+      away_[chunk * colliders + k] = least - settings_.radius - law_.reach() - 0.5 * longest;
+      nearest_[chunk] = std::min(nearest_[chunk], away_[chunk * colliders + k]);
+    }
+  }
+}
+
+Samples RodContacts::samplesOf(const Configuration &c, int chunk, int collider, int first) const {
+  const std::vector<SamplePoint> &points = points_[collider];
+  const int begin = chunk * chunk_edges, edges = std::min(chunk_edges, rod_.edges - begin), n = int(points.size());
+  Samples out;
+  out.collider = collider;
+  out.chunk = chunk;
+  out.first = first;
+  out.pose = scene_.colliders[collider].poseAt(c.obstacleTime(index_));
+  out.count = std::min(Samples::most, edges * n - first);
+  for (int k = 0; k < out.count; ++k) {
+    out.slot[k] = rod_.slot(begin + (first + k) / n);
+    out.point[k] = (first + k) % n;
+    const Vec3 from = c.positionAt(out.slot[k]);
+    const Vec3 x = out.pose.toLocal(from + points[out.point[k]].at * (c.positionAt(out.slot[k] + 1) - from));
+    for (int a = 0; a < 3; ++a) out.local[a][k] = x[a];
+  }
+  const double *const local[3] = {out.local[0].data(), out.local[1].data(), out.local[2].data()};
+  scene_.colliders[collider].shape->distances(local, out.count, out.distance.data());
+  for (int k = 0; k < out.count; ++k) out.distance[k] -= settings_.radius;
+  return out;
+}
+
+double RodContacts::smallestGap(const Configuration &c) const {
+  const int colliders = int(scene_.colliders.size());
+  const bool stood = c.obstacleTime(index_) == seen_time_;
+  double least = HUGE_VAL;
+  for (int chunk = 0; chunk < chunks(); ++chunk) {
+    const double moved = movedSince(c, chunk);
+    const int edges = std::min(chunk_edges, rod_.edges - chunk * chunk_edges);
+    for (int k = 0; k < colliders; ++k) {
+      if (stood && away_[chunk * colliders + k] - moved + law_.reach() >= least) continue;
+      for (int first = 0; first < edges * int(points_[k].size()); first += Samples::most) {
+        const Samples samples = samplesOf(c, chunk, k, first);
+        least = std::min(least, *std::min_element(samples.distance.begin(), samples.distance.begin() + samples.count));
+      }
+    }
+  }
+  return least;
+}
+
+double RodContacts::freeFraction(const Configuration &from, const Configuration &to) const {
+  constexpr int most_steps = 200;
+  constexpr double safety = 0.9, near = 0.1;
+  const double wall = law_.wall();
+  if (!std::isfinite(wall)) return 1;
+  double free = 1;
+  visitNear(to, &from, [&](const Samples &there) {
+    const Samples here = samplesOf(from, there.chunk, there.collider, there.first);
+    struct Way {
+      Vec3 from, way;
+      double length, gap, stop, done;
+    };
+    std::array<Way, Samples::most> ways;
+    int count = 0;
+    for (int k = 0; k < there.count; ++k) {
+      Way w;
+      for (int a = 0; a < 3; ++a) {
+        w.from[a] = here.local[a][k];
+        w.way[a] = there.local[a][k] - w.from[a];
+      }
+      w.length = w.way.norm();
+      w.gap = here.distance[k] - wall;
+      if (!(w.gap <= w.length)) continue;
+      w.stop = near * std::min(w.gap, settings_.isBarrier() ? settings_.distance : settings_.radius);
+      w.done = 0;
+      ways[count++] = w;
+    }
+    for (int step = 0; step < most_steps && count > 0; ++step) {
+      std::array<std::array<double, Samples::most>, 3> x;
+      std::array<double, Samples::most> distance;
+      int going = 0;
+      for (int k = 0; k < count; ++k) {
+        Way w = ways[k];
+        w.done += safety * std::max(w.gap, 0.0) / w.length;
+        if (w.done >= free) continue;
+        for (int a = 0; a < 3; ++a) x[a][going] = w.from[a] + w.done * w.way[a];
+        ways[going++] = w;
+      }
+      const double *const points[3] = {x[0].data(), x[1].data(), x[2].data()};
+      scene_.colliders[there.collider].shape->distances(points, going, distance.data());
+      count = 0;
+      for (int k = 0; k < going; ++k) {
+        ways[k].gap = distance[k] - settings_.radius - wall;
+        if (ways[k].gap <= ways[k].stop)
+          free = std::min(free, ways[k].done);
+        else
+          ways[count++] = ways[k];
+      }
+    }
+    for (int k = 0; k < count; ++k) free = std::min(free, ways[k].done);
+  });
+  return free;
+}
+
+} // namespace tendril

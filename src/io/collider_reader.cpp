@@ -1,0 +1,202 @@
+#include "tendril/io/collider_reader.hpp"
+
+#include "tendril/io/mesh_reader.hpp"
+#include "tendril/io/support_reader.hpp"
+#include "tendril/io/text.hpp"
+
+#include <filesystem>
+
+namespace tendril {
+namespace {
+
+constexpr MotionKeys motion_keys{"colliders[].motion", "colliders[].motion.velocity",
+                                 "colliders[].motion.angular_velocity", "colliders[].motion.table"};
+
+/// Turns the axis of a shape, z, to this one.
+Mat3 turnTo(const Vec3 &axis) { return Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), axis).toRotationMatrix(); }
+
+Vec3 axisOf(YamlMap &map, KeyOf<KeyType::vector> key) {
+  return map.has(*key) ? unit(map.at(*key)) : map.vector(key).normalized();
+}
+
+/// Endless where it is not given.
+double lengthOf(YamlMap &map, KeyOf<KeyType::number> key) { return map.has(*key) ? map.number(key) : HUGE_VAL; }
+
+struct ShapeKey {
+  KeyOf<KeyType::map, KeyType::list, KeyType::word_or_map> key;
+  /// Makes the shape and notes its size; `turn` is from its axes to those of the collider.
+  void (*read)(YamlMap &map, Collider &out, Mat3 &turn);
+};
+
+constexpr ShapeKey shape_keys[] = {
+    {"colliders[].plane",
+     [](YamlMap &map, Collider &out, Mat3 &turn) {
+       turn = turnTo(axisOf(map, "colliders[].plane.normal"));
+       out.shape = makeHalfSpace();
+     }},
+    {"colliders[].sphere",
+     [](YamlMap &map, Collider &out, Mat3 &) {
+       out.size[0] = map.number("colliders[].sphere.radius");
+       out.shape = makeSphere(out.size[0]);
+     }},
+    {"colliders[].capsule",
+     [](YamlMap &map, Collider &out, Mat3 &turn) {
+       turn = turnTo(axisOf(map, "colliders[].capsule.axis"));
+       out.size = {map.number("colliders[].capsule.radius"), map.number("colliders[].capsule.length"), 0};
+       out.shape = makeCapsule(out.size[0], out.size[1]);
+     }},
+    {"colliders[].cylinder",
+     [](YamlMap &map, Collider &out, Mat3 &turn) {
+       turn = turnTo(axisOf(map, "colliders[].cylinder.axis"));
+       out.size = {map.number("colliders[].cylinder.radius"), lengthOf(map, "colliders[].cylinder.length"), 0};
+       out.shape = makeCylinder(out.size[0], out.size[1]);
+     }},
+    {"colliders[].box",
+     [](YamlMap &map, Collider &out, Mat3 &) {
+       out.size = map.vector("colliders[].box.size");
+       if (!(out.size.minCoeff() > 0)) map.at("colliders[].box.size").fail("'size' must be positive");
+       out.shape = makeBox(out.size);
+     }},
+    {"colliders[].mesh",
+     [](YamlMap &map, Collider &out, Mat3 &) {
+       const YamlValue file = map.at("colliders[].mesh.file");
+       const std::string path = (std::filesystem::path(file.file()).parent_path() / file.text()).string();
+       auto mesh = std::make_shared<TriangleMesh>(readMesh(path));
+       const double scale = map.number("colliders[].mesh.scale");
+       for (Vec3 &x : mesh->vertices) x *= scale;
+       out.mesh = mesh;
+       try {
+         out.shape = makeMesh(*mesh, map.has("colliders[].mesh.cell") ? map.number("colliders[].mesh.cell") : 0);
+       } catch (const std::invalid_argument &e) {
+         throw SceneError(path + ": " + e.what());
+       }
+     }},
+    {"colliders[].tube", [](YamlMap &map, Collider &out, Mat3 &turn) {
+       turn = turnTo(axisOf(map, "colliders[].tube.axis"));
+       out.size = {map.number("colliders[].tube.bore"), lengthOf(map, "colliders[].tube.outer"),
+                   lengthOf(map, "colliders[].tube.length")};
+       if (out.size[1] <= out.size[0])
+         map.at("colliders[].tube.outer").fail("'outer' must be larger than 'bore', " + shortText(out.size[0]) + " m");
+       out.shape = makeTube(out.size[0], out.size[1], out.size[2]);
+     }}};
+
+struct ContactKeys {
+  KeyOf<KeyType::word, KeyType::word_or_map> law, friction_at, quadrature;
+  KeyOf<KeyType::number> radius, distance, stiffness, threshold, smoothing, friction, fall_off_velocity, slip_length,
+      tangential_damping, normal_damping;
+};
+// clang-format off
+constexpr ContactKeys of_scene{
+    "contact.law", "contact.friction_at", "contact.quadrature", "contact.radius", "contact.distance",
+    "contact.stiffness", "contact.threshold", "contact.smoothing", "contact.friction", "contact.fall_off_velocity",
+    "contact.slip_length", "contact.tangential_damping", "contact.normal_damping"};
+constexpr ContactKeys of_rod{
+    "rods[].contact.law", "rods[].contact.friction_at", "rods[].contact.quadrature", "rods[].contact.radius",
+    "rods[].contact.distance", "rods[].contact.stiffness", "rods[].contact.threshold", "rods[].contact.smoothing",
+    "rods[].contact.friction", "rods[].contact.fall_off_velocity", "rods[].contact.slip_length",
+    "rods[].contact.tangential_damping", "rods[].contact.normal_damping"};
+// clang-format on
+
+void readSettings(YamlMap &map, const ContactKeys &keys, ContactSettings &out) {
+  auto read = [&](KeyOf<KeyType::number> key, double &value) {
+    if (map.has(*key)) value = map.number(key);
+  };
+  if (map.has(*keys.law))
+    out.law = map.word(keys.law) == "penalty" ? ContactSettings::Law::penalty : ContactSettings::Law::barrier;
+  read(keys.radius, out.radius);
+  read(keys.distance, out.distance);
+  read(keys.stiffness, out.stiffness);
+  read(keys.threshold, out.threshold);
+  read(keys.smoothing, out.smoothing);
+  read(keys.friction, out.friction);
+  read(keys.fall_off_velocity, out.fall_off_velocity);
+  read(keys.slip_length, out.slip_length);
+  read(keys.tangential_damping, out.tangential_damping);
+  read(keys.normal_damping, out.normal_damping);
+  if (map.has(*keys.friction_at)) out.friction_at_surface = map.word(keys.friction_at) == "surface";
+  if (map.has(*keys.quadrature))
+    out.quadrature = map.word(keys.quadrature) == "auto" ? 0 : std::stoi(map.word(keys.quadrature));
+  auto refuse = [&](KeyOf<KeyType::number> key, const char *law) {
+    if (map.has(*key)) map.at(*key).fail("'" + std::string(key->name()) + "' is for 'law: " + law + "'");
+  };
+  if (!out.isBarrier()) refuse(keys.distance, "penalty");
+  if (out.isBarrier()) refuse(keys.threshold, "penalty");
+  if (out.isBarrier()) refuse(keys.smoothing, "penalty");
+  map.finish();
+}
+
+} // namespace
+
+ContactSettings readContact(YamlMap &scene) {
+  ContactSettings settings;
+  settings.radius = settings.distance = std::nan("");
+  if (scene.has("contact")) {
+    YamlMap map(scene.at("contact"), "contact");
+    readSettings(map, of_scene, settings);
+  }
+  return settings;
+}
+
+void readContact(YamlMap &rod, ContactSettings &settings) {
+  if (!rod.has("rods[].contact")) return;
+  const YamlValue value = rod.at("rods[].contact");
+  if (value.isMap()) {
+    YamlMap map(value, "rods[].contact");
+    readSettings(map, of_rod, settings);
+  } else
+    settings.on = rod.word("rods[].contact") != "none";
+}
+
+void completeContact(const YamlValue &colliders, Scene &scene) {
+  for (Rod &rod : scene.rods) {
+    ContactSettings &contact = rod.contact;
+    if (!contact.on) continue;
+    if (std::isnan(contact.radius)) {
+      if (!rod.material.section)
+        colliders.fail("rod '" + rod.name +
+                       "' has no section that tells its radius; give it 'contact: {radius: ...}', or 'contact: none'");
+      contact.radius = std::max(rod.material.section->halfAxes()[0], rod.material.section->halfAxes()[1]);
+    }
+    if (contact.radius == 0 && contact.isBarrier())
+      colliders.fail("rod '" + rod.name + "' has the contact radius 0, for which there is only 'law: penalty'");
+    if (std::isnan(contact.distance)) contact.distance = 0.2 * contact.radius;
+    if (contact.isBarrier() && contact.distance > contact.radius)
+      colliders.fail("rod '" + rod.name + "': the 'distance' of its contact, " + shortText(contact.distance) +
+                     " m, must not exceed its radius, " + shortText(contact.radius) + " m");
+    if (!contact.isBarrier() && contact.stiffness == 0) contact.stiffness = 1e9;
+    if (contact.slip_length == 0) contact.slip_length = 1e-3 * (contact.radius > 0 ? contact.radius : 0.01);
+  }
+}
+
+void readCollider(const YamlValue &value, Scene &scene) {
+  YamlMap map(value, "colliders");
+  Collider c;
+  c.name = map.has("colliders[].name") ? readName(map.at("colliders[].name"))
+                                       : "collider" + std::to_string(scene.colliders.size());
+  for (const Collider &other : scene.colliders)
+    if (other.name == c.name) value.fail("a collider with the name '" + c.name + "' is there already");
+  Mat3 turn = Mat3::Identity();
+  for (const ShapeKey &shape : shape_keys) {
+    if (!map.has(*shape.key)) continue;
+    const std::string name(shape.key->name());
+    if (c.shape) value.fail("has two shapes, '" + c.kind + "' and '" + name + "'; write a collider for each");
+    c.kind = name;
+    YamlMap block(map.at(*shape.key), shape.key);
+    shape.read(block, c, turn);
+    block.finish();
+  }
+  if (!c.shape) {
+    map.refuseUnknown();
+    value.fail("a collider needs a shape: plane, sphere, capsule, cylinder, box, tube or mesh");
+  }
+  c.position = map.vector("colliders[].position");
+  const Vec3 rotation = map.vector("colliders[].rotation");
+  if (rotation.norm() > 0) turn = Eigen::AngleAxisd(rotation.norm(), rotation.normalized()).toRotationMatrix() * turn;
+  c.rotation = turn;
+  if (map.has("colliders[].motion")) c.motion = readMotion(map.at("colliders[].motion"), motion_keys);
+  if (map.has("colliders[].friction")) c.friction = map.number("colliders[].friction");
+  map.finish();
+  scene.colliders.push_back(std::move(c));
+}
+
+} // namespace tendril

@@ -1,0 +1,75 @@
+#include "tendril/model/motion.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace tendril {
+namespace {
+
+/// Fraction of the way through the interval that holds `time`, and the interval's left end.
+std::pair<std::size_t, double> locate(const std::vector<Motion::Key> &table, double time) {
+  if (time <= table.front().time) return {0, 0.0};
+  if (time >= table.back().time) return {table.size() - 1, 0.0};
+  const auto right =
+      std::upper_bound(table.begin(), table.end(), time, [](double t, const Motion::Key &k) { return t < k.time; });
+  const std::size_t i = std::size_t(right - table.begin()) - 1;
+  return {i, (time - table[i].time) / (table[i + 1].time - table[i].time)};
+}
+
+Vec3 interpolate(const std::vector<Motion::Key> &table, double time, Vec3 Motion::Key::*member) {
+  const auto [i, s] = locate(table, time);
+  return s == 0 ? table[i].*member : Vec3((1 - s) * (table[i].*member) + s * (table[i + 1].*member));
+}
+
+/// How fast a member changes between the two rows around `time`, the one before where they meet; zero outside.
+Vec3 slope(const std::vector<Motion::Key> &table, double time, Vec3 Motion::Key::*member) {
+  for (std::size_t k = 1; k < table.size(); ++k)
+    if (table[k - 1].time < time && time <= table[k].time)
+      return (table[k].*member - table[k - 1].*member) / (table[k].time - table[k - 1].time);
+  return Vec3::Zero();
+}
+
+} // namespace
+
+Vec3 Motion::displacementAt(double time) const {
+  return table.empty() ? Vec3(velocity * time) : interpolate(table, time, &Key::displacement);
+}
+
+Vec3 Motion::velocityAt(double time) const { return table.empty() ? velocity : slope(table, time, &Key::displacement); }
+
+Vec3 Motion::rotationVectorAt(double time) const {
+  return table.empty() ? Vec3(angular_velocity * time) : interpolate(table, time, &Key::rotation);
+}
+
+Mat3 Motion::rotationAt(double time) const {
+  const Vec3 r = rotationVectorAt(time);
+  const double angle = r.norm();
+  if (angle == 0) return Mat3::Identity();
+  return Eigen::AngleAxisd(angle, r / angle).toRotationMatrix();
+}
+
+/// Jl(r) dr/dt of the rotation vector r, Jl the left Jacobian of the exponential map.
+Vec3 Motion::angularVelocityAt(double time) const {
+  if (table.empty()) return angular_velocity;
+  const Vec3 r = rotationVectorAt(time), rate = slope(table, time, &Key::rotation);
+  const double angle = r.norm();
+  if (angle < 1e-8) return rate;
+  const Vec3 axis = r / angle;
+  const double sine = std::sin(angle) / angle, cosine = (1 - std::cos(angle)) / angle;
+  return sine * rate + (1 - sine) * axis * axis.dot(rate) + cosine * axis.cross(rate);
+}
+
+Vec3 Motion::turnBetween(double from, double to) const {
+  const int parts = 1 + int(2 * (rotationVectorAt(to) - rotationVectorAt(from)).norm());
+  Vec3 sum = Vec3::Zero();
+  Mat3 before = rotationAt(from);
+  for (int k = 1; k <= parts; ++k) {
+    const Mat3 now = rotationAt(k == parts ? to : from + (to - from) * k / parts);
+    const Eigen::AngleAxisd turn(Mat3(now * before.transpose()));
+    sum += turn.angle() * turn.axis();
+    before = now;
+  }
+  return sum;
+}
+
+} // namespace tendril

@@ -1,0 +1,318 @@
+/// Contact with obstacles: its laws, samples and derivatives, and what never passes through.
+#include "tendril/contact/contact.hpp"
+
+#include "support/random_cell.hpp"
+#include "support/rods.hpp"
+#include "tendril/energy/derived.hpp"
+
+namespace tendril::test {
+namespace {
+
+std::vector<std::vector<double>> rowsOf(const std::string &file) {
+  std::ifstream in(std::string(TENDRIL_SOURCE_DIR) + "/data/reference/" + file);
+  EXPECT_TRUE(in) << file;
+  std::vector<std::vector<double>> rows;
+  bool named = false;
+  for (std::string line; std::getline(in, line);) {
+    if (line.empty() || line[0] == '#') continue;
+    if (!named) {
+      named = true;
+      continue;
+    }
+    std::istringstream cells(line);
+    rows.emplace_back();
+    for (std::string cell; std::getline(cells, cell, ',');) rows.back().push_back(std::stod(cell));
+  }
+  return rows;
+}
+
+Collider floorAt(double height) {
+  Collider c;
+  c.name = "floor";
+  c.shape = makeHalfSpace();
+  c.position = Vec3(0, 0, height);
+  return c;
+}
+
+Collider obstacle(std::shared_ptr<const Shape> shape, const Vec3 &position) {
+  Collider c;
+  c.name = "obstacle";
+  c.shape = std::move(shape);
+  c.position = position;
+  return c;
+}
+
+ContactSettings barrier(double radius) {
+  ContactSettings s;
+  s.radius = radius;
+  s.distance = 0.2 * radius;
+  return s;
+}
+
+/// A round rod of rubber of radius 5 mm along x, its axis at a height.
+Rod rubber(int edges, double height, double length = 0.3) {
+  Rod rod;
+  rod.name = "rod";
+  rod.position = lineShape(Vec3(0, 0, height), Vec3(length, 0, height), edges).points;
+  rod.material = homogeneousMaterial({SectionShape::circle, {0.005, 0}}, 1e6, 4e5, 1000);
+  rod.contact = barrier(0.005);
+  setBishopDirectors(rod);
+  return rod;
+}
+
+TEST(ContactLaws, PenaltyIsThatOfTheTable) {
+  for (const auto &row : rowsOf("contact_penalty_law.csv")) {
+    ContactSettings s;
+    s.law = ContactSettings::Law::penalty;
+    s.stiffness = row[0];
+    s.smoothing = row[1];
+    s.threshold = row[2];
+    const GapLaw law = NormalLaw(s, 0)(row[4]);
+    EXPECT_NEAR(law.value, row[5], 1e-13 * row[5]) << row[4];
+    EXPECT_NEAR(-law.slope, row[6], 1e-12 * row[6]) << row[4]; // the table's last digits
+    EXPECT_NEAR(law.curvature, row[7], 1e-12 * row[7]) << row[4];
+  }
+}
+
+TEST(ContactLaws, DerivativesAreThoseOfTheValue) {
+  ContactSettings s = barrier(0.005);
+  for (const bool is_barrier : {true, false}) {
+    s.law = is_barrier ? ContactSettings::Law::barrier : ContactSettings::Law::penalty;
+    s.stiffness = 1e7;
+    const NormalLaw law(s, 30);
+    for (double t = 0.01; t < 1; t += 0.03) {
+      const double g = is_barrier ? (t - 0.5) * s.distance : s.threshold - 3 * t * s.smoothing;
+      const double h = 1e-5 * (is_barrier ? t * s.distance : s.smoothing);
+      const GapLaw here = law(g), ahead = law(g + h), behind = law(g - h);
+      // Of second order in h = 1e-5 t, over which the barrier's derivatives grow by 1/t: 1e-8.
+      EXPECT_NEAR((ahead.value - behind.value) / (2 * h), here.slope, 1e-7 * std::abs(here.slope) + 1e-9) << g;
+      EXPECT_NEAR((ahead.slope - behind.slope) / (2 * h), here.curvature, 1e-8 * here.curvature + 1e-3) << g;
+      EXPECT_GE(here.curvature, 0);
+      EXPECT_LE(here.slope, 0);
+    }
+  }
+}
+
+/// Line force over stiffness at which the gap is this part of the width (Li et al. 2020): from the formula, worked out
+/// by hand for three of them.
+TEST(ContactLaws, BarrierGrowsWithoutBound) {
+  const ContactSettings s = barrier(1);
+  const NormalLaw law(s, 1);
+  auto force = [&](double part) { return -law((part - 0.5) * s.distance).slope; };
+  EXPECT_NEAR(force(0.5), 0.25 / 0.5 + 2 * 0.5 * std::log(2.0), 1e-14);
+  EXPECT_NEAR(force(1e-4) * 1e-4, 1, 3e-3); // 1/t, and 2 ln t beside it
+  EXPECT_EQ(force(1.0), 0);
+  EXPECT_EQ(law(-0.5 * s.distance).value, std::numeric_limits<double>::infinity());
+}
+
+TEST(ContactSamples, IntegrateStraightLinesExactly) {
+  for (int quadrature = 0; quadrature <= 3; ++quadrature)
+    for (const double spacing : {10.0, 0.4, 0.11}) {
+      double sum = 0, moment = 0;
+      for (const SamplePoint &p : samplePoints(quadrature, 1, spacing)) {
+        sum += p.weight;
+        moment += p.weight * p.at;
+      }
+      EXPECT_NEAR(sum, 1, 1e-15);
+      EXPECT_NEAR(moment, 0.5, 1e-15);
+    }
+}
+
+/// A rod in the gap between a ball, a box's corner and a cylinder that it touches, with random turns and places.
+Scene cornerScene(bool penalty) {
+  Scene scene;
+  scene.gravity = Vec3(0, 0, -9.81);
+  Rod rod = rubber(12, 0.02);
+  if (penalty) {
+    rod.contact.law = ContactSettings::Law::penalty;
+    rod.contact.stiffness = 1e7;
+  }
+  scene.rods = {rod};
+  const Vec3 turn(0.3, 0.5, -0.2);
+  const Mat3 turned = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+  auto touch = [&](std::shared_ptr<const Shape> shape, const Vec3 &position, const Mat3 &rotation) {
+    Collider c = obstacle(std::move(shape), position);
+    c.rotation = rotation;
+    Distance least{HUGE_VAL, Vec3::Zero(), Mat3::Zero()};
+    for (double x = 0; x <= 0.3; x += 1e-4)
+      if (const Distance d = c.shape->at(c.poseAt(0).toLocal(Vec3(x, 0, 0.02))); d.value < least.value) least = d;
+    c.position += (least.value - 0.00505) * (rotation * least.gradient); // the surface 0.05 mm from that of the rod
+    scene.colliders.push_back(c);
+  };
+  touch(makeSphere(0.05), Vec3(0.05, 0.01, -0.05), Mat3::Identity());
+  touch(makeBox(Vec3(0.1, 0.1, 0.1)), Vec3(0.17, 0.07, 0.02), turned);
+  touch(makeCylinder(0.02, 0.1), Vec3(0.27, -0.05, 0.03), turned.transpose());
+  return scene;
+}
+
+TEST(Contact, DerivativesAreThoseOfTheEnergy) {
+  for (const bool penalty : {false, true}) {
+    Simulation sim;
+    EXPECT_PETSC(sim.setUp(cornerScene(penalty), dynamics(1e-3, 1)));
+    IncrementalPotential &potential = *sim.potential;
+    Step step;
+    step.dt = 1e-3;
+    step.time = 1e-3;
+    step.mixed = false;
+    sim.solver.begin(sim.state, step);
+    const RodRange &rod = sim.elements->rods[0];
+    ASSERT_GT(potential.energyBudget(sim.state, potential.iterate(), 1, potential.all()).contact, penalty ? 1e-9 : -1);
+    Random random{5};
+    Planes v = sim.dofs.makePlanes();
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
+      for (int a = 0; a < slot_size; ++a) v[a][s] = 1e-3 * random();
+    v[3][rod.vertexEnd() - 1] = 0;
+    const Derivatives &d = potential.derivatives();
+    const double slope = dot(rod, d.gradient, v);
+    Planes kv = sim.dofs.makePlanes();
+    potential.blocks().multiply(rod, v, kv);
+    const double curvature = dot(rod, kv, v);
+    auto energy = [&](double h) {
+      Configuration trial;
+      EXPECT_TRUE(potential.tryMove(v, h, 0, RetractionKind::additive, trial));
+      return potential.rodEnergy(trial, 0).value;
+    };
+    // Differences of fourth order: 30 h^4 over the barrier's width, and rounding over h^2.
+    const double h = 2e-3;
+    const double e[5] = {energy(-2 * h), energy(-h), energy(0), energy(h), energy(2 * h)};
+    EXPECT_NEAR((e[0] - 8 * e[1] + 8 * e[3] - e[4]) / (12 * h), slope, 1e-7 * std::abs(slope)) << penalty;
+    EXPECT_NEAR((-e[0] + 16 * e[1] - 30 * e[2] + 16 * e[3] - e[4]) / (12 * h * h), curvature, 1e-5 * curvature);
+  }
+}
+
+/// A rod at rest on a plane lies where force per length and weight balance, whatever its edges
+/// (contact_rest_depth.csv).
+TEST(Contact, RestsAtTheDepthOfItsLaw) {
+  for (const auto &row : rowsOf("contact_rest_depth.csv"))
+    for (const int edges : {1, 7}) {
+      Scene scene;
+      scene.gravity = Vec3(0, 0, -9.81);
+      Rod rod = rubber(edges, 0.9e-3);
+      rod.material = homogeneousMaterial({SectionShape::circle, {row[0], 0}}, 1e7, 4e6, row[1]);
+      rod.contact.law = ContactSettings::Law::penalty;
+      rod.contact.radius = 0;
+      rod.contact.stiffness = row[2];
+      rod.contact.smoothing = row[3];
+      rod.contact.threshold = row[4];
+      scene.rods = {rod};
+      scene.colliders = {floorAt(0)};
+      Simulation sim;
+      runTo(sim, scene, dynamics(0.1, 3));
+      for (const Vec3 &x : sim.state.position) EXPECT_NEAR(x[2], row[6], 1e-9) << row[0] << " " << edges;
+    }
+}
+
+/// The moment at the clamp is the root of 2 B w H, whatever the height (contact_lowering.csv), with H to where the rod
+/// comes to lie.
+TEST(Contact, LoweredOntoAPlaneBearsTheMomentOfItsHeight) {
+  for (const double height : {0.35, 1.0, 3.0}) {
+    const double length = 3 + 3 * std::sqrt(height);
+    std::vector<double> errors;
+    for (const int edges : {120, 240}) {
+      Rod rod = inextensibleRod(lineShape(Vec3(0, 0, height + 0.01), Vec3(length, 0, height + 0.01), edges).points);
+      rod.material = {1, 1e-6, 1e6, 1, {1, 1}, 0, 0};
+      rod.contact = barrier(0.01);
+      Scene scene = clampedScene(rod);
+      scene.gravity = Vec3(0, 0, -1);
+      scene.colliders = {floorAt(0)};
+      Simulation sim;
+      runTo(sim, scene, statics());
+      double lowest = HUGE_VAL;
+      for (const Vec3 &x : sim.state.position) lowest = std::min(lowest, x[2]);
+      EXPECT_GT(lowest, 0.01 - 0.001); // half of the barrier's width
+      double rest = 0;                 // of the last part, which lies
+      for (int i = edges; i > edges - 5; --i) rest += sim.state.position[i][2] / 5;
+      const RodActions actions = rodActions(sim.scene, *sim.elements, sim.state, 1, 1);
+      const double moment = actions.reaction_moment[0].norm(), exact = std::sqrt(2 * (height + 0.01 - rest));
+      errors.push_back(std::abs(moment / exact - 1));
+      // What is left of the vertical balance is at the clamp.
+      double contact = 0;
+      for (const Vec3 &f :
+           contactForces(sim.scene, *sim.elements, sim.state, configurationOf(sim.state, sim.scene, *sim.elements, 1)))
+        contact += f[2];
+      EXPECT_NEAR(contact + actions.reaction[0][2], length, 1e-5 * length);
+    }
+    EXPECT_LT(errors[1], 1e-3) << height;
+    EXPECT_GT(order(errors[0], errors[1]), 1.5) << height << ": " << errors[0] << " " << errors[1];
+  }
+}
+
+/// Thrown at a plate of 1 mm, flat, slanting and with the tip first: nothing is ever behind it.
+TEST(Contact, NothingPassesAThinPlate) {
+  for (const double speed : {1.0, 10.0, 100.0, 1000.0})
+    for (const double dt : {1e-2, 1e-3})
+      for (const double slope : {0.0, 0.15, 1.5707}) {
+        if (slope > 1 && speed > 100) continue; // faster than the sound in the rod, 1000 m/s
+        Rod rod = rubber(30, 0.05);
+        rod.material = homogeneousMaterial({SectionShape::circle, {0.005, 0}}, 1e9, 4e8, 1000);
+        rod.energy = Energy::classical;
+        for (Vec3 &x : rod.position) x = Vec3(x[0] * std::cos(slope), 0, x[2] + x[0] * std::sin(slope));
+        setBishopDirectors(rod, Vec3(0, 1, 0));
+        rod.initial_velocity = Vec3(0, 0, -speed);
+        Scene scene;
+        scene.gravity = Vec3(0, 0, -9.81);
+        scene.rods = {rod};
+        scene.colliders = {obstacle(makeBox(Vec3(2, 2, 1e-3)), Vec3(0, 0, -0.5e-3))};
+        Simulation sim;
+        const LoopSettings settings = dynamics(dt, 20 * dt);
+        EXPECT_PETSC(sim.setUp(scene, settings));
+        TimeLoop loop(sim.solver, settings);
+        bool finished = false;
+        EXPECT_PETSC(loop.run(
+            sim.state,
+            [&](const State &state, const Diagnostics &row) {
+              for (const Vec3 &x : state.position)
+                if (x.head<2>().norm() < 0.9) EXPECT_GT(x[2], 0.0045) << speed << " " << dt << " " << slope;
+              if (row.time > 0) EXPECT_GT(row.contact_gap_min, -0.0005);
+              EXPECT_LE(row.newton_iterations, 100);
+              return PetscErrorCode(0);
+            },
+            &finished));
+        EXPECT_TRUE(finished) << loop.failure() << speed << " " << dt << " " << slope;
+      }
+}
+
+TEST(Contact, ThatIsFarAwayChangesNoBit) {
+  Scene scene = clampedScene(rubber(40, 0));
+  scene.gravity = Vec3(0, 0, -9.81);
+  for (const bool dynamic : {false, true}) {
+    Simulation without, with;
+    const LoopSettings settings = dynamic ? dynamics(1e-2, 0.2) : statics();
+    scene.colliders.clear();
+    runTo(without, scene, settings);
+    scene.colliders = {floorAt(-1), obstacle(makeSphere(0.1), Vec3(0, 1, 0))};
+    runTo(with, scene, settings);
+    EXPECT_EQ(without.state.position, with.state.position);
+    EXPECT_EQ(without.state.velocity, with.state.velocity);
+  }
+}
+
+/// A table that rises lifts the rod on it; a ram that moves sideways into a held rod stops it.
+TEST(Contact, ObstaclesThatMoveTakeRodsAlong) {
+  Scene scene;
+  scene.gravity = Vec3(0, 0, -9.81);
+  scene.rods = {rubber(20, 0.0055)};
+  scene.colliders = {floorAt(0)};
+  scene.colliders[0].motion.velocity = Vec3(0.1, 0, 0.2);
+  Simulation sim;
+  runTo(sim, scene, dynamics(0.02, 1));
+  for (const Vec3 &x : sim.state.position) EXPECT_NEAR(x[2], 0.2 + 0.005, 0.0005);
+  for (const Vec3 &v : sim.state.velocity) EXPECT_NEAR(v[2], 0.2, 1e-3); // backward Euler damps the first jolt
+}
+
+TEST(Contact, TellsWhereItIsTightest) {
+  Scene scene;
+  scene.rods = {rubber(20, 0.004)};
+  scene.colliders = {floorAt(0)};
+  Simulation sim;
+  EXPECT_PETSC(sim.setUp(scene, dynamics(1e-2, 1)));
+  const std::vector<Touch> found =
+      tightest(sim.scene, *sim.elements, configurationOf(sim.state, sim.scene, *sim.elements, 0));
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].rod, 0);
+  EXPECT_EQ(found[0].collider, 0);
+  EXPECT_NEAR(found[0].gap, -0.001, 1e-15);
+}
+
+} // namespace
+} // namespace tendril::test

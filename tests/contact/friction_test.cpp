@@ -1,0 +1,203 @@
+/// Friction with obstacles: its potential, sliding, sticking, stopping, rolling, and ropes round drums.
+#include "tendril/contact/friction.hpp"
+
+#include "support/random_cell.hpp"
+#include "support/rods.hpp"
+
+namespace tendril::test {
+namespace {
+
+constexpr double radius = 0.005, g = 9.81;
+
+Collider solid(std::shared_ptr<const Shape> shape, const Vec3 &position = Vec3::Zero()) {
+  Collider c;
+  c.name = "obstacle";
+  c.shape = std::move(shape);
+  c.position = position;
+  return c;
+}
+
+/// A round rod on the plane z = 0, which is inclined by an angle along a direction.
+Scene onIncline(double coefficient, double angle, const Vec3 &along, bool at_surface, int edges = 6) {
+  Rod rod;
+  rod.name = "rod";
+  rod.position = lineShape(Vec3(0, 0, radius), Vec3(0.3, 0, radius), edges).points;
+  rod.material = homogeneousMaterial({SectionShape::circle, {radius, 0}}, 1e7, 4e6, 1000);
+  rod.contact.radius = radius;
+  rod.contact.distance = 0.2 * radius;
+  rod.contact.stiffness = 64;
+  rod.contact.friction = coefficient;
+  rod.contact.friction_at_surface = at_surface;
+  rod.contact.slip_length = 1e-3 * radius;
+  setBishopDirectors(rod);
+  Scene scene;
+  scene.gravity = g * (std::sin(angle) * along - std::cos(angle) * Vec3::UnitZ());
+  scene.rods = {rod};
+  scene.colliders = {solid(makeHalfSpace())};
+  return scene;
+}
+
+TEST(Friction, ForceIsTheSlopeOfItsPotential) {
+  SlidingPoint point{};
+  point.pressing = 3;
+  point.coefficient = 0.4;
+  point.normal = Vec3(1, 2, -2).normalized();
+  ContactSettings settings;
+  settings.tangential_damping = 0.1;
+  settings.normal_damping = 0.2;
+  const Sliding sliding{1e-3, 0.01};
+  Random random{2};
+  for (int n = 0; n < 200; ++n) {
+    const Vec3 way = 1.5e-3 * Vec3(random(), random(), random());
+    const SlidingForce here = slidingForce(point, settings, sliding, way);
+    constexpr double h = 1e-8;
+    for (int k = 0; k < 3; ++k) {
+      const SlidingForce ahead = slidingForce(point, settings, sliding, way + h * Vec3::Unit(k)),
+                         behind = slidingForce(point, settings, sliding, way - h * Vec3::Unit(k));
+      // Of second order in h over the fall-off, 1e-10; rounding 1e-16/1e-8 of the value.
+      EXPECT_NEAR((ahead.value - behind.value) / (2 * h), here.gradient[k], 1e-6);
+      EXPECT_LT(((ahead.gradient - behind.gradient) / (2 * h) - here.hessian.col(k)).norm(),
+                1e-4 * here.hessian.norm());
+    }
+    EXPECT_GE(here.hessian.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(), -1e-9);
+    EXPECT_LE(slidingForce(point, {}, {1e-3, 0}, way).gradient.norm(), 1.2 * (1 + 1e-14)); // Coulomb's limit
+  }
+}
+
+TEST(Friction, DerivativesAreThoseOfTheEnergy) {
+  for (const bool at_surface : {false, true}) {
+    Simulation sim;
+    Scene scene = onIncline(0.5, 0.3, Vec3(1, 1, 0).normalized(), at_surface, 8);
+    EXPECT_PETSC(sim.setUp(scene, dynamics(1e-2, 1)));
+    TimeLoop loop(sim.solver, dynamics(1e-2, 0.2));
+    bool finished;
+    EXPECT_PETSC(loop.run(
+        sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+    IncrementalPotential &potential = *sim.potential;
+    Step step;
+    step.dt = 1e-2;
+    step.time = sim.state.time + 1e-2;
+    step.mixed = false;
+    sim.solver.begin(sim.state, step);
+    const RodRange &rod = sim.elements->rods[0];
+    Random random{5};
+    Planes v = sim.dofs.makePlanes();
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
+      for (int a = 0; a < slot_size; ++a) v[a][s] = (a == 3 ? 5e-2 : 1e-4) * random();
+    v[3][rod.vertexEnd() - 1] = 0;
+    Configuration moved;
+    ASSERT_TRUE(potential.tryMove(v, 0.5, 0, RetractionKind::additive, moved));
+    potential.accept(moved, 0);
+    potential.resetAxialForces(0);
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
+      for (int a = 0; a < slot_size; ++a) v[a][s] = (a == 3 ? 5e-2 : 1e-4) * random();
+    v[3][rod.vertexEnd() - 1] = 0;
+    const Derivatives &d = potential.derivatives();
+    const double slope = dot(rod, d.gradient, v);
+    Planes kv = sim.dofs.makePlanes();
+    potential.blocks().multiply(rod, v, kv);
+    const double curvature = dot(rod, kv, v);
+    auto energy = [&](double h) {
+      Configuration trial;
+      EXPECT_TRUE(potential.tryMove(v, h, 0, RetractionKind::additive, trial));
+      return potential.rodEnergy(trial, 0).value;
+    };
+    const double h = 1e-2;
+    const double e[5] = {energy(-2 * h), energy(-h), energy(0), energy(h), energy(2 * h)};
+    EXPECT_NEAR((e[0] - 8 * e[1] + 8 * e[3] - e[4]) / (12 * h), slope, 1e-5 * std::abs(slope)) << at_surface;
+    EXPECT_NEAR((-e[0] + 16 * e[1] - 30 * e[2] + 16 * e[3] - e[4]) / (12 * h * h), curvature, 1e-4 * curvature);
+  }
+}
+
+/// contact_incline.csv: mu = 0.5. Lying across it would roll; along it, nothing turns.
+TEST(Friction, OnAnInclineARodCreepsOrSlides) {
+  constexpr double degree = pi / 180;
+  for (const bool at_surface : {false, true}) {
+    Simulation creeping;
+    runTo(creeping, onIncline(0.5, 26 * degree, Vec3::UnitX(), at_surface), dynamics(0.02, 2));
+    for (const Vec3 &v : creeping.state.velocity) EXPECT_NEAR(v[0], 8.43364044e-3, 1e-6 * 8.4e-3);
+    for (const auto &[angle, acceleration] : {std::pair{27.0, 0.0832598013}, {30.0, 0.657145394}}) {
+      Simulation early, late;
+      runTo(early, onIncline(0.5, angle * degree, Vec3::UnitX(), at_surface), dynamics(0.02, 1));
+      runTo(late, onIncline(0.5, angle * degree, Vec3::UnitX(), at_surface), dynamics(0.02, 2));
+      for (std::size_t i = 0; i < late.state.velocity.size(); ++i)
+        EXPECT_NEAR(late.state.velocity[i][0] - early.state.velocity[i][0], acceleration, 1e-6) << angle;
+    }
+  }
+}
+
+/// contact_stop.csv: v0 = 1, mu = 0.5, fall-off 0.01. Backward Euler stops early by v0 dt/2, which extrapolates.
+TEST(Friction, StopsASlidingRod) {
+  std::vector<double> way;
+  for (const double dt : {2e-3, 1e-3}) {
+    Scene scene = onIncline(0.5, 0, Vec3::UnitX(), false);
+    scene.rods[0].initial_velocity = Vec3(1, 0, 0);
+    // At rest from the start: where the barrier bears the weight, W' = w.
+    const double weight = scene.rods[0].material.linear_density * g;
+    double low = -0.49 * scene.rods[0].contact.distance, high = -low;
+    for (int k = 0; k < 100; ++k) {
+      const double middle = 0.5 * (low + high);
+      (-NormalLaw(scene.rods[0].contact, 64)(middle).slope > weight ? low : high) = middle;
+    }
+    for (Vec3 &x : scene.rods[0].position) x[2] = radius + low;
+    Simulation sim;
+    runTo(sim, scene, dynamics(dt, 0.6));
+    way.push_back(sim.state.position[0][0]);
+  }
+  EXPECT_NEAR(2 * way[1] - way[0], 0.101940737, 2e-4 * 0.1); // 1e-4 is dt^2 of what is left after the extrapolation
+  EXPECT_GT(way[1], way[0] - 1e-6 + 0);
+}
+
+/// A cylinder rolls down with 2/3 of what it would slide with: its moment of inertia is m r^2/2. In a step it turns by
+/// 0.13 rad, and the way of its surface point is the sine of that.
+TEST(Friction, AtTheSurfaceARodRolls) {
+  const double angle = 0.2;
+  Simulation sim;
+  runTo(sim, onIncline(0.6, angle, Vec3::UnitY(), true, 4), dynamics(5e-4, 1));
+  const double slides = g * std::sin(angle);
+  for (std::size_t i = 0; i < sim.state.velocity.size(); ++i)
+    EXPECT_NEAR(sim.state.velocity[i][1], 2.0 / 3 * slides, 0.02 * slides);
+  for (const double rate : sim.state.twist_rate) EXPECT_NEAR(std::abs(rate) * radius, 2.0 / 3 * slides, 0.02 * slides);
+  Simulation sliding;
+  runTo(sliding, onIncline(0.6, angle, Vec3::UnitY(), false, 4), dynamics(5e-3, 1));
+  for (const Vec3 &v : sliding.state.velocity) EXPECT_LT(v[1], 0.01); // at the centreline it sticks
+}
+
+/// A cord without bending stiffness over a drum: tensions at both ends are as exp(coefficient x angle) when it slides.
+TEST(Friction, AtTheCentrelineARopeHoldsAsEulerSays) {
+  constexpr double drum = 0.1;
+  const double rho = drum + radius, coefficient = 0.3;
+  constexpr int edges = 120;
+  Rod rod;
+  rod.name = "rope";
+  const double straight = 0.1, length = pi * rho + 2 * straight;
+  for (int i = 0; i <= edges; ++i) {
+    const double s = length * i / edges - straight;
+    const double angle = std::clamp(s / rho, 0.0, pi), beyond = s < 0 ? s : s > pi * rho ? s - pi * rho : 0;
+    rod.position.push_back(Vec3(-rho * std::cos(angle), 0, rho * std::sin(angle)) * 1.002 +
+                           Vec3(0, 0, s < 0 ? beyond : -beyond));
+  }
+  rod.material = {0.1, 1e-6, 1e5, 0, {0, 0}, 0, 0};
+  rod.gravity = false;
+  rod.contact.radius = radius;
+  rod.contact.distance = 0.2 * radius;
+  rod.contact.friction = coefficient;
+  rod.contact.friction_at_surface = false;
+  rod.contact.slip_length = 1e-6;
+  setBishopDirectors(rod);
+  Scene scene;
+  scene.rods = {rod};
+  scene.supports = {hold(scene, 0, edges, Support::Kind::pin)};
+  scene.supports[0].motion.velocity = Vec3(0, 0, -0.02);
+  scene.forces = {{0, 0, Vec3(0, 0, -10)}};
+  scene.colliders = {solid(makeCylinder(drum, HUGE_VAL))};
+  const Vec3 turn = pi / 2 * Vec3::UnitX();
+  scene.colliders[0].rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+  Simulation sim;
+  runTo(sim, scene, statics(10));
+  const double ratio = sim.state.axial_force[edges - 1] / sim.state.axial_force[0];
+  EXPECT_NEAR(ratio, std::exp(coefficient * pi), 0.005 * ratio); // lag 1e-3, and edges of 5 mm
+}
+
+} // namespace
+} // namespace tendril::test
