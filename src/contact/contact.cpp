@@ -228,7 +228,8 @@ private:
 
   void beginSliding(const State &state, const Configuration &start, const Step &step, int r) {
     const ContactSettings &settings = scene_.rods[r].contact;
-    const double time = step.isStatic() ? 0 : step.time - state.time;
+    // Where a method asks for the forces of its start, no time has gone.
+    const double time = step.isStatic() ? 0 : step.time > state.time ? step.time - state.time : step.dt;
     OfSliding &sliding = sliding_[r];
     sliding.sliding = {step.isStatic() ? settings.slip_length : settings.fall_off_velocity * time, time};
     sliding.start = &start;

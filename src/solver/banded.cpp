@@ -150,12 +150,17 @@ template <class T> void BandedFactor::factorGroup(const Group &group, const Band
     negative = elimination.negative;
     zero = elimination.zero;
   };
+  auto eliminate = [&]<bool ring, bool joined>(const auto &read) {
+    run(Elimination<T, ring, joined, std::decay_t<decltype(read)>>(first, held, read, records));
+  };
   if (first.closed)
-    run(Elimination<T, true, decltype(rare)>(first, held, rare, records, joins));
-  else if (shifted || cable || system.coupled_positions || joins)
-    run(Elimination<T, false, decltype(rare)>(first, held, rare, records, joins));
+    joins ? eliminate.template operator()<true, true>(rare) : eliminate.template operator()<true, false>(rare);
+  else if (joins)
+    eliminate.template operator()<false, true>(rare);
+  else if (shifted || cable || system.coupled_positions)
+    eliminate.template operator()<false, false>(rare);
   else
-    run(Elimination<T, false, decltype(plain)>(first, held, plain, records, false));
+    eliminate.template operator()<false, false>(plain);
   for (int l = 0; l < group.count; ++l)
     if constexpr (std::is_same_v<T, Pack>) {
       negative_[group.rod[l] - rods_.begin] = int(negative[l]);

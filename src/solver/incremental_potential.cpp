@@ -178,7 +178,7 @@ const Derivatives &IncrementalPotential::derivatives(RodSet rods) {
 double IncrementalPotential::renew(int r) {
   double change = 0;
   for (auto &term : terms_) change = std::max(change, term->renew(iterate_, r));
-  known_[r] = Known::nothing;
+  if (change > 0) known_[r] = Known::nothing;
   return change;
 }
 

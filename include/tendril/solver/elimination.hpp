@@ -11,10 +11,10 @@ namespace tendril {
 
 /// The elimination of one rod, or of a pack of rods of one shape. `Read`: read(plane, i) gives an entry of the blocks
 /// at local slot i, shift included; those of positions with edges where it `joins`.
-template <class T, bool ring, class Read> class Elimination {
+template <class T, bool ring, bool joins, class Read> class Elimination {
 public:
-  Elimination(const RodRange &rod, const std::vector<char> &held, const Read &read, T *records, bool joins)
-      : n_(rod.edges), last_(rod.vertices - 1), held_(held), read_(read), records_(records), joins_(joins) {}
+  Elimination(const RodRange &rod, const std::vector<char> &held, const Read &read, T *records)
+      : n_(rod.edges), last_(rod.vertices - 1), held_(held), read_(read), records_(records) {}
 
   /// \param first receives L and inverse pivots of the first vertex
   [[gnu::flatten]] void run(T *first) {
@@ -46,7 +46,6 @@ private:
   const std::vector<char> &held_;
   const Read &read_;
   T *const records_;
-  const bool joins_;
   Square<T> state_;
   Square<T> mixed_, corner_; ///< of a ring: state with border, border with itself
 
@@ -118,8 +117,9 @@ private:
 #pragma GCC unroll 3
       for (int c = 0; c < 3; ++c) b[r].set(c, state_[edge_at + r][c]);
     }
-    for (int r = 0; joins_ && r < edge_size; ++r)
-      for (int c = 0; c < 3; ++c) b[r].set(c, b[r][c] + joined(c, r, i));
+    if constexpr (joins)
+      for (int r = 0; r < edge_size; ++r)
+        for (int c = 0; c < 3; ++c) b[r].set(c, b[r][c] + joined(c, r, i));
     T *const out = record(i), *const lower = out + Record<T>::lower, *const inverse = out + Record<T>::pivots;
     T l[6], d[edge_size];
     factorSmall<edge_size>(a, scale, l, d, negative, zero);
@@ -209,7 +209,7 @@ private:
     constexpr int twist = state_size - 1;
     Row<T> b = across(3, i);
     for (int c = 0; c < 3; ++c) b.set(c, state_[twist][c] - (state_[twist][edge_at + c] + own(c, 3, i)));
-    if (joins_) joinSubstituted(i, next, b);
+    if constexpr (joins) joinSubstituted(i, next, b);
     if constexpr (ring) {
       for (int r = 0; r < 3; ++r) mixed_[r].subtract(T(1.0), mixed_[edge_at + r]);
       for (int r = 0; r < 3; ++r) mixed_[edge_at + r] = {};
@@ -278,7 +278,7 @@ private:
     }
     for (int p = 0; p < edge_size; ++p) bs.set(edge_at + p, read_(EdgeBlocks::across(3, p), i + 1));
     addVertex(i, next);
-    if (joins_) {
+    if constexpr (joins) {
       joinSubstituted(i, next, b);
       for (int r = 0; r < 3; ++r)
         for (int c = 0; c < 3; ++c) mixed_[r].set(c, mixed_[r][c] + joined(r, c, i));
