@@ -119,7 +119,7 @@ double RodContacts::smallestGap(const Configuration &c) const {
 
 double RodContacts::freeFraction(const Configuration &from, const Configuration &to) const {
   constexpr int most_steps = 200;
-  constexpr double safety = 0.9, near = 0.1;
+  constexpr double safety = 0.9, near = 0.2;
   const double wall = law_.wall();
   if (!std::isfinite(wall)) return 1;
   double free = 1;
