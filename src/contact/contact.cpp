@@ -12,6 +12,11 @@ namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
+/// That of the step that led to a state.
+NormalLaw lawOf(const Scene &scene, const State &state, int r) {
+  return {scene.rods[r].contact, state.contact_stiffness.empty() ? 0 : state.contact_stiffness[r]};
+}
+
 /// Stiffness of the barrier of a rod [N/m]: ten times its weight per length, or where it has more to bear as much as
 /// keeps surfaces within the barrier; a power of four, so that it seldom changes from step to step.
 double barrierStiffness(const Scene &scene, const Elements &elements, const State &state, double dt, double pressure,
@@ -53,8 +58,8 @@ public:
       double pressure = 0;
       if (!state.contact_stiffness.empty() && state.contact_stiffness[r] > 0) {
         rod.setStiffness(state.contact_stiffness[r]);
-        rod.visitNear(start, nullptr, [&](const Samples &samples) {
-          for (int k = 0; k < samples.count; ++k) pressure = std::max(pressure, -rod.law()(samples.distance[k]).slope);
+        rod.visitTouching(start, rod.law(), [&](const Samples &samples, int k) {
+          pressure = std::max(pressure, -rod.law()(samples.distance[k]).slope);
         });
       }
       stiffness = barrierStiffness(scene_, elements_, state, step.dt, pressure, r);
@@ -77,10 +82,8 @@ public:
     double sum = 0;
     if (!of_[r]) return sum;
     const RodContacts &rod = *of_[r];
-    rod.visitNear(c, nullptr, [&](const Samples &samples) {
-      for (int k = 0; k < samples.count; ++k)
-        if (samples.distance[k] < rod.law().reach())
-          sum += rod.weight(samples, k) * rod.law()(samples.distance[k]).value;
+    rod.visitTouching(c, rod.law(), [&](const Samples &samples, int k) {
+      sum += rod.weight(samples, k) * rod.law()(samples.distance[k]).value;
     });
     for (const SlidingPoint &point : sliding_[r].points) sum += forceOn(point, c, r).value;
     return sum;
@@ -89,61 +92,33 @@ public:
     double sum = 0;
     if (!of_[r]) return sum;
     const RodContacts &rod = *of_[r];
-    rod.visitNear(c, nullptr, [&](const Samples &samples) {
-      for (int k = 0; k < samples.count; ++k)
-        if (samples.distance[k] < rod.law().reach()) {
-          const Vec3 x = c.positionAt(samples.slot[k]);
-          sum += rod.weight(samples, k) * std::abs(rod.law()(samples.distance[k]).slope) * 4 * epsilon * x.norm();
-        }
+    rod.visitTouching(c, rod.law(), [&](const Samples &samples, int k) {
+      const Vec3 x = c.positionAt(samples.slot[k]);
+      sum += rod.weight(samples, k) * std::abs(rod.law()(samples.distance[k]).slope) * 4 * epsilon * x.norm();
     });
     return sum;
   }
-  /// A quadratic form A of a point between the vertices of an edge, at the part s of it, is
-  /// (1 - s) A(x_i) + s A(x_{i+1}) - s (1 - s) A(e_i): nothing that joins vertices.
   void addDerivatives(const Configuration &c, int r, Derivatives &out, HessianKind kind) const override {
     if (!of_[r]) return;
     const RodContacts &rod = *of_[r];
     const BlockPlanes blocks(out.blocks, elements_.rods[r]);
-    rod.visitNear(c, nullptr, [&](const Samples &samples) {
-      for (int k = 0; k < samples.count; ++k) {
-        if (!(samples.distance[k] < rod.law().reach())) continue;
-        const ContactPoint point = contactPoint(scene_, rod, samples, k);
-        const int slot = samples.slot[k];
-        for (int a = 0; a < 3; ++a) {
-          out.equilibrium[a][slot] -= (1 - point.at) * point.force[a];
-          out.equilibrium[a][slot + 1] -= point.at * point.force[a];
-        }
-        if (kind == HessianKind::none) continue;
-        const Mat3 h = kind == HessianKind::gauss_newton ? point.stiffness : Mat3(point.stiffness + point.curvature);
-        for (int a = 0; a < 3; ++a)
-          for (int b = a; b < 3; ++b) {
-            blocks.vertex(a, b)[slot] += (1 - point.at) * h(a, b);
-            blocks.vertex(a, b)[slot + 1] += point.at * h(a, b);
-            blocks.own(a, b)[slot] -= point.at * (1 - point.at) * h(a, b);
-          }
-      }
+    const BlockPlanes *wanted = kind == HessianKind::none ? nullptr : &blocks;
+    rod.visitTouching(c, rod.law(), [&](const Samples &samples, int k) {
+      const ContactPoint point = contactPoint(scene_, rod, samples, k);
+      const Mat3 h = kind == HessianKind::gauss_newton ? point.stiffness : Mat3(point.stiffness + point.curvature);
+      addOnAxis(point.at, samples.slot[k], -point.force, h, wanted, out);
     });
-    for (const SlidingPoint &point : sliding_[r].points)
-      addSliding(point, forceOn(point, c, r), c, kind == HessianKind::none ? nullptr : &blocks, out);
+    for (const SlidingPoint &point : sliding_[r].points) addSliding(point, forceOn(point, c, r), c, wanted, out);
   }
   void addObstacleMotion(const Configuration &c, double time, int r, Planes &out) const override {
     if (!of_[r]) return;
     const RodContacts &rod = *of_[r];
-    rod.visitNear(c, nullptr, [&](const Samples &samples) {
+    rod.visitTouching(c, rod.law(), [&](const Samples &samples, int k) {
       const Collider &collider = scene_.colliders[samples.collider];
       if (!collider.motion.moves()) return;
-      const Collider::Pose there = collider.poseAt(time);
-      for (int k = 0; k < samples.count; ++k) {
-        if (!(samples.distance[k] < rod.law().reach())) continue;
-        const ContactPoint point = contactPoint(scene_, rod, samples, k);
-        const Vec3 x(samples.local[0][k], samples.local[1][k], samples.local[2][k]);
-        const Vec3 moved = there.fromLocal(x) - samples.pose.fromLocal(x);
-        const Vec3 change = -(point.stiffness + point.curvature) * moved;
-        for (int a = 0; a < 3; ++a) {
-          out[a][samples.slot[k]] += (1 - point.at) * change[a];
-          out[a][samples.slot[k] + 1] += point.at * change[a];
-        }
-      }
+      const ContactPoint point = contactPoint(scene_, rod, samples, k);
+      const Vec3 moved = collider.poseAt(time).fromLocal(samples.at(k)) - samples.pose.fromLocal(samples.at(k));
+      spread(point.at, samples.slot[k], -(point.stiffness + point.curvature) * moved, out);
     });
   }
   double workOfObstacles(const Configuration &c, double from, double to, int r) const override {
@@ -154,12 +129,9 @@ public:
       const Collider &obstacle = scene_.colliders[collider];
       return Vec3(obstacle.poseAt(to).fromLocal(x) - obstacle.poseAt(from).fromLocal(x));
     };
-    rod.visitNear(c, nullptr, [&](const Samples &samples) {
-      for (int k = 0; k < samples.count && scene_.colliders[samples.collider].motion.moves(); ++k)
-        if (samples.distance[k] < rod.law().reach())
-          work += contactPoint(scene_, rod, samples, k)
-                      .force.dot(
-                          moved(samples.collider, Vec3(samples.local[0][k], samples.local[1][k], samples.local[2][k])));
+    rod.visitTouching(c, rod.law(), [&](const Samples &samples, int k) {
+      if (scene_.colliders[samples.collider].motion.moves())
+        work += contactPoint(scene_, rod, samples, k).force.dot(moved(samples.collider, samples.at(k)));
     });
     for (const SlidingPoint &point : sliding_[r].points)
       work -= forceOn(point, c, r).gradient.dot(moved(point.collider, point.touched));
@@ -192,9 +164,9 @@ public:
   void addEnergies(const State &state, const Configuration &c, double, int r, EnergyBudget &out) const override {
     if (!of_[r]) return;
     const RodContacts &rod = *of_[r];
-    const NormalLaw law(scene_.rods[r].contact, state.contact_stiffness.empty() ? 0 : state.contact_stiffness[r]);
-    rod.visitNear(c, nullptr, [&](const Samples &samples) {
-      for (int k = 0; k < samples.count; ++k) out.contact += rod.weight(samples, k) * law(samples.distance[k]).value;
+    const NormalLaw law = lawOf(scene_, state, r);
+    rod.visitTouching(c, law, [&](const Samples &samples, int k) {
+      out.contact += rod.weight(samples, k) * law(samples.distance[k]).value;
     });
   }
   double smallestGap(const Configuration &c, int r) const override {
@@ -233,8 +205,7 @@ private:
     OfSliding &sliding = sliding_[r];
     sliding.sliding = {step.isStatic() ? settings.slip_length : settings.fall_off_velocity * time, time};
     sliding.start = &start;
-    sliding.points =
-        slidingPoints(start, NormalLaw(settings, state.contact_stiffness.empty() ? 0 : state.contact_stiffness[r]), r);
+    sliding.points = slidingPoints(start, lawOf(scene_, state, r), r);
   }
 
   /// What touches at a configuration, by a law.
@@ -243,31 +214,27 @@ private:
     const RodContacts &contacts = *of_[r];
     const Configuration &start = *sliding_[r].start;
     std::vector<SlidingPoint> points;
-    contacts.visitNear(c, nullptr, [&](const Samples &samples) {
-      for (int k = 0; k < samples.count; ++k) {
-        const double force = -contacts.weight(samples, k) * law(samples.distance[k]).slope;
-        if (!(force > 0)) continue;
-        const ContactPoint contact = contactPoint(scene_, contacts, samples, k);
-        const Collider &collider = scene_.colliders[samples.collider];
-        SlidingPoint point{};
-        point.slot = samples.slot[k];
-        point.point = samples.point[k];
-        point.collider = samples.collider;
-        point.at = contact.at;
-        point.pressing = force;
-        point.coefficient =
-            collider.friction < 0 ? rod.contact.friction : std::sqrt(rod.contact.friction * collider.friction);
-        point.normal = contact.normal;
-        const Vec3 x(samples.local[0][k], samples.local[1][k], samples.local[2][k]);
-        const Vec3 below = samples.pose.rotation.transpose() * contact.normal;
-        point.touched = x - rod.contact.radius * below;
-        if (carriesSurface(rod))
-          point.arm = -rod.contact.radius * (matrixOf(c.frameAt(point.slot)).transpose() * contact.normal);
-        else
-          point.touched = x;
-        point.start = wayOf(point, start, collider.poseAt(start.obstacleTime(r)));
-        points.push_back(point);
+    contacts.visitTouching(c, law, [&](const Samples &samples, int k) {
+      const double force = -contacts.weight(samples, k) * law(samples.distance[k]).slope;
+      if (!(force > 0)) return;
+      const ContactPoint contact = contactPoint(scene_, contacts, samples, k);
+      const Collider &collider = scene_.colliders[samples.collider];
+      SlidingPoint point{};
+      point.slot = samples.slot[k];
+      point.point = samples.point[k];
+      point.collider = samples.collider;
+      point.at = contact.at;
+      point.pressing = force;
+      point.coefficient =
+          collider.friction < 0 ? rod.contact.friction : std::sqrt(rod.contact.friction * collider.friction);
+      point.normal = contact.normal;
+      point.touched = samples.at(k);
+      if (carriesSurface(rod)) {
+        point.touched -= rod.contact.radius * (samples.pose.rotation.transpose() * contact.normal);
+        point.arm = -rod.contact.radius * (matrixOf(c.frameAt(point.slot)).transpose() * contact.normal);
       }
+      point.start = wayOf(point, start, collider.poseAt(start.obstacleTime(r)));
+      points.push_back(point);
     });
     return points;
   }
@@ -276,14 +243,12 @@ private:
 } // namespace
 
 ContactPoint contactPoint(const Scene &scene, const RodContacts &rod, const Samples &samples, int k) {
-  const Distance d =
-      scene.colliders[samples.collider].shape->at(Vec3(samples.local[0][k], samples.local[1][k], samples.local[2][k]));
+  const Distance d = scene.colliders[samples.collider].shape->at(samples.at(k));
   const GapLaw law = rod.law()(samples.distance[k]);
   const double weight = rod.weight(samples, k);
   const Mat3 &q = samples.pose.rotation;
   ContactPoint point;
   point.at = rod.points(samples.collider)[samples.point[k]].at;
-  point.gap = samples.distance[k];
   point.normal = q * d.gradient;
   point.force = -weight * law.slope * point.normal;
   point.stiffness = weight * law.curvature * point.normal * point.normal.transpose();
@@ -300,14 +265,11 @@ std::vector<Vec3> contactForces(const Scene &scene, const Elements &elements, co
     if (!state.contact_stiffness.empty()) rod.setStiffness(state.contact_stiffness[r]);
     rod.look(c, true);
     const RodRange &range = elements.rods[r];
-    rod.visitNear(c, nullptr, [&](const Samples &samples) {
-      for (int k = 0; k < samples.count; ++k) {
-        if (!(samples.distance[k] < rod.law().reach())) continue;
-        const ContactPoint point = contactPoint(scene, rod, samples, k);
-        const int i = samples.slot[k] - range.first_slot;
-        force[range.first_vertex + i] += (1 - point.at) * point.force;
-        force[range.first_vertex + (i + 1) % range.vertices] += point.at * point.force;
-      }
+    rod.visitTouching(c, rod.law(), [&](const Samples &samples, int k) {
+      const ContactPoint point = contactPoint(scene, rod, samples, k);
+      const int i = samples.slot[k] - range.first_slot;
+      force[range.first_vertex + i] += (1 - point.at) * point.force;
+      force[range.first_vertex + (i + 1) % range.vertices] += point.at * point.force;
     });
   }
   return force;

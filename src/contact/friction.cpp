@@ -40,25 +40,26 @@ SlidingForce slidingForce(const SlidingPoint &point, const ContactSettings &sett
   return force;
 }
 
+void addOnAxis(double at, int slot, const Vec3 &gradient, const Mat3 &hessian, const BlockPlanes *blocks,
+               Derivatives &out) {
+  spread(at, slot, gradient, out.equilibrium);
+  for (int a = 0; blocks && a < 3; ++a)
+    for (int b = a; b < 3; ++b) {
+      blocks->vertex(a, b)[slot] += (1 - at) * hessian(a, b);
+      blocks->vertex(a, b)[slot + 1] += at * hessian(a, b);
+      blocks->own(a, b)[slot] -= at * (1 - at) * hessian(a, b);
+    }
+}
+
 /// The point is y = x_i + s e + o, with the arm o turned by the spin of the edge. What joins x_i with the edge is
-/// D2 dy/dspin; see Contact::addDerivatives for the rest of the axis' own part.
+/// D2 dy/dspin.
 void addSliding(const SlidingPoint &point, const SlidingForce &force, const Configuration &c, const BlockPlanes *blocks,
                 Derivatives &out) {
   const double s = point.at;
   const int slot = point.slot;
   const Vec3 &g = force.gradient;
-  for (int a = 0; a < 3; ++a) {
-    out.equilibrium[a][slot] += (1 - s) * g[a];
-    out.equilibrium[a][slot + 1] += s * g[a];
-  }
   const Mat3 &h = force.hessian;
-  if (blocks)
-    for (int a = 0; a < 3; ++a)
-      for (int b = a; b < 3; ++b) {
-        blocks->vertex(a, b)[slot] += (1 - s) * h(a, b);
-        blocks->vertex(a, b)[slot + 1] += s * h(a, b);
-        blocks->own(a, b)[slot] -= s * (1 - s) * h(a, b);
-      }
+  addOnAxis(s, slot, g, h, blocks, out);
   if (point.arm.isZero(0)) return;
   const Frame frame = c.frameAt(slot);
   const Vec3 o = matrixOf(frame) * point.arm;

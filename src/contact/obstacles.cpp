@@ -32,7 +32,7 @@ RodContacts::RodContacts(const Scene &scene, const Elements &elements, int rod)
 }
 
 double RodContacts::movedSince(const Configuration &c, int chunk) const {
-  const int begin = chunk * chunk_edges, end = std::min(begin + chunk_edges, rod_.edges);
+  const int begin = chunk * chunk_edges, end = begin + edgesOf(chunk);
   Pack most(0.0);
   for (int i = begin; i <= end; i += lanes) {
     Pack sum(0.0);
@@ -52,7 +52,7 @@ void RodContacts::look(const Configuration &c, bool all) {
   seen_time_ = time;
   for (int chunk = 0; chunk < chunks(); ++chunk) {
     if (!all && movedSince(c, chunk) <= 0.5 * nearest_[chunk]) continue;
-    const int begin = chunk * chunk_edges, count = std::min(chunk_edges, rod_.edges - begin) + 1;
+    const int begin = chunk * chunk_edges, count = edgesOf(chunk) + 1;
     double longest = 0;
     for (int i = begin; i < begin + count; ++i) {
       const Vec3 x = c.positionAt(rod_.slot(i));
@@ -79,7 +79,7 @@ void RodContacts::look(const Configuration &c, bool all) {
 
 Samples RodContacts::samplesOf(const Configuration &c, int chunk, int collider, int first) const {
   const std::vector<SamplePoint> &points = points_[collider];
-  const int begin = chunk * chunk_edges, edges = std::min(chunk_edges, rod_.edges - begin), n = int(points.size());
+  const int begin = chunk * chunk_edges, edges = edgesOf(chunk), n = int(points.size());
   Samples out;
   out.collider = collider;
   out.chunk = chunk;
@@ -105,7 +105,7 @@ double RodContacts::smallestGap(const Configuration &c) const {
   double least = HUGE_VAL;
   for (int chunk = 0; chunk < chunks(); ++chunk) {
     const double moved = movedSince(c, chunk);
-    const int edges = std::min(chunk_edges, rod_.edges - chunk * chunk_edges);
+    const int edges = edgesOf(chunk);
     for (int k = 0; k < colliders; ++k) {
       if (stood && away_[chunk * colliders + k] - moved + law_.reach() >= least) continue;
       for (int first = 0; first < edges * int(points_[k].size()); first += Samples::most) {
@@ -133,10 +133,8 @@ double RodContacts::freeFraction(const Configuration &from, const Configuration 
     int count = 0;
     for (int k = 0; k < there.count; ++k) {
       Way w;
-      for (int a = 0; a < 3; ++a) {
-        w.from[a] = here.local[a][k];
-        w.way[a] = there.local[a][k] - w.from[a];
-      }
+      w.from = here.at(k);
+      w.way = there.at(k) - w.from;
       w.length = w.way.norm();
       w.gap = here.distance[k] - wall;
       if (!(w.gap <= w.length)) continue;

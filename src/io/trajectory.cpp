@@ -184,7 +184,7 @@ void TrajectoryWriter::writeFrame(const State &state) {
   if (wanted(From::contact))
     snapshot.contact_force =
         contactForces(scene_, elements_, state, configurationOf(state, scene_, elements_, state.time));
-  for (const Collider &c : scene_.colliders) {
+  for (const Collider &c : wanted(From::motion) ? scene_.colliders : std::vector<Collider>()) {
     const Collider::Pose pose = c.poseAt(state.time);
     const Eigen::Quaterniond q(pose.rotation);
     snapshot.collider_position.push_back(pose.position);

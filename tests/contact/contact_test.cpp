@@ -1,7 +1,7 @@
 /// Contact with obstacles: its laws, samples and derivatives, and what never passes through.
 #include "tendril/contact/contact.hpp"
 
-#include "support/random_cell.hpp"
+#include "support/differences.hpp"
 #include "support/rods.hpp"
 #include "tendril/energy/derived.hpp"
 
@@ -155,28 +155,11 @@ TEST(Contact, DerivativesAreThoseOfTheEnergy) {
     step.time = 1e-3;
     step.mixed = false;
     sim.solver.begin(sim.state, step);
-    const RodRange &rod = sim.elements->rods[0];
     ASSERT_GT(potential.energyBudget(sim.state, potential.iterate(), 1, potential.all()).contact, penalty ? 1e-9 : -1);
     Random random{5};
-    Planes v = sim.dofs.makePlanes();
-    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
-      for (int a = 0; a < slot_size; ++a) v[a][s] = 1e-3 * random();
-    v[3][rod.vertexEnd() - 1] = 0;
-    const Derivatives &d = potential.derivatives();
-    const double slope = dot(rod, d.gradient, v);
-    Planes kv = sim.dofs.makePlanes();
-    potential.blocks().multiply(rod, v, kv);
-    const double curvature = dot(rod, kv, v);
-    auto energy = [&](double h) {
-      Configuration trial;
-      EXPECT_TRUE(potential.tryMove(v, h, 0, RetractionKind::additive, trial));
-      return potential.rodEnergy(trial, 0).value;
-    };
-    // Differences of fourth order: 30 h^4 over the barrier's width, and rounding over h^2.
-    const double h = 2e-3;
-    const double e[5] = {energy(-2 * h), energy(-h), energy(0), energy(h), energy(2 * h)};
-    EXPECT_NEAR((e[0] - 8 * e[1] + 8 * e[3] - e[4]) / (12 * h), slope, 1e-7 * std::abs(slope)) << penalty;
-    EXPECT_NEAR((-e[0] + 16 * e[1] - 30 * e[2] + 16 * e[3] - e[4]) / (12 * h * h), curvature, 1e-5 * curvature);
+    // 30 h^4 over the barrier's width, and rounding over h^2.
+    expectDerivatives(potential, randomIncrement(potential, random, 1e-3, 1e-3), 2e-3, 1e-7, 1e-5,
+                      penalty ? "penalty" : "barrier");
   }
 }
 

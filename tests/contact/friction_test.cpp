@@ -1,7 +1,7 @@
 /// Friction with obstacles: its potential, sliding, sticking, stopping, rolling, and ropes round drums.
 #include "tendril/contact/friction.hpp"
 
-#include "support/random_cell.hpp"
+#include "support/differences.hpp"
 #include "support/rods.hpp"
 
 namespace tendril::test {
@@ -79,33 +79,14 @@ TEST(Friction, DerivativesAreThoseOfTheEnergy) {
     step.time = sim.state.time + 1e-2;
     step.mixed = false;
     sim.solver.begin(sim.state, step);
-    const RodRange &rod = sim.elements->rods[0];
     Random random{5};
-    Planes v = sim.dofs.makePlanes();
-    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
-      for (int a = 0; a < slot_size; ++a) v[a][s] = (a == 3 ? 5e-2 : 1e-4) * random();
-    v[3][rod.vertexEnd() - 1] = 0;
     Configuration moved;
-    ASSERT_TRUE(potential.tryMove(v, 0.5, 0, RetractionKind::additive, moved));
+    ASSERT_TRUE(
+        potential.tryMove(randomIncrement(potential, random, 1e-4, 5e-2), 0.5, 0, RetractionKind::additive, moved));
     potential.accept(moved, 0);
     potential.resetAxialForces(0);
-    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
-      for (int a = 0; a < slot_size; ++a) v[a][s] = (a == 3 ? 5e-2 : 1e-4) * random();
-    v[3][rod.vertexEnd() - 1] = 0;
-    const Derivatives &d = potential.derivatives();
-    const double slope = dot(rod, d.gradient, v);
-    Planes kv = sim.dofs.makePlanes();
-    potential.blocks().multiply(rod, v, kv);
-    const double curvature = dot(rod, kv, v);
-    auto energy = [&](double h) {
-      Configuration trial;
-      EXPECT_TRUE(potential.tryMove(v, h, 0, RetractionKind::additive, trial));
-      return potential.rodEnergy(trial, 0).value;
-    };
-    const double h = 1e-2;
-    const double e[5] = {energy(-2 * h), energy(-h), energy(0), energy(h), energy(2 * h)};
-    EXPECT_NEAR((e[0] - 8 * e[1] + 8 * e[3] - e[4]) / (12 * h), slope, 1e-5 * std::abs(slope)) << at_surface;
-    EXPECT_NEAR((-e[0] + 16 * e[1] - 30 * e[2] + 16 * e[3] - e[4]) / (12 * h * h), curvature, 1e-4 * curvature);
+    expectDerivatives(potential, randomIncrement(potential, random, 1e-4, 5e-2), 1e-2, 1e-5, 1e-4,
+                      at_surface ? "at the surface" : "at the centreline");
   }
 }
 

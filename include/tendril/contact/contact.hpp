@@ -9,7 +9,6 @@ namespace tendril {
 /// A sample in contact, in the axes of the world.
 struct ContactPoint {
   double at;      ///< part of its edge
-  double gap;     ///< between surfaces [m]
   Vec3 normal;    ///< out of the obstacle
   Vec3 force;     ///< on the rod [N]
   Mat3 stiffness; ///< second derivatives of the energy by its place: by the law, ... [N/m]

@@ -42,6 +42,19 @@ SlidingForce slidingForce(const SlidingPoint &point, const ContactSettings &sett
 /// The way of a point since the step began, relative to the obstacle.
 Vec3 wayOf(const SlidingPoint &point, const Configuration &c, const Collider::Pose &pose);
 
+/// Adds what acts on a point of the axis of a rod, at a part of an edge, to its two vertices.
+inline void spread(double at, int slot, const Vec3 &value, Planes &out) {
+  for (int a = 0; a < 3; ++a) {
+    out[a][slot] += (1 - at) * value[a];
+    out[a][slot + 1] += at * value[a];
+  }
+}
+
+/// Adds derivatives by the place of such a point. A quadratic form A of it is
+/// (1 - s) A(x_i) + s A(x_{i+1}) - s (1 - s) A(e_i): nothing that joins vertices. \param blocks or null
+void addOnAxis(double at, int slot, const Vec3 &gradient, const Mat3 &hessian, const BlockPlanes *blocks,
+               Derivatives &out);
+
 /// Adds what a point does to the derivatives of its rod. \param blocks or null
 void addSliding(const SlidingPoint &point, const SlidingForce &force, const Configuration &c, const BlockPlanes *blocks,
                 Derivatives &out);

@@ -26,6 +26,7 @@ struct Samples {
   std::array<std::array<double, most>, 3> local; ///< in the axes of the obstacle
   Collider::Pose pose;
   int collider, chunk, first; ///< which these are
+  Vec3 at(int k) const { return {local[0][k], local[1][k], local[2][k]}; }
 };
 
 /// What one rod may touch. Edges are looked at in chunks: one that moves less than it was away last is left out.
@@ -38,6 +39,13 @@ public:
   /// Calls visit(Samples &) for those samples that may be nearer than the reach of the law. \param also another
   /// configuration in which samples may be near, or null
   template <class Visit> void visitNear(const Configuration &c, const Configuration *also, Visit visit) const;
+  /// Calls visit(samples, k) for those that the law reaches.
+  template <class Visit> void visitTouching(const Configuration &c, const NormalLaw &law, Visit visit) const {
+    visitNear(c, nullptr, [&](const Samples &samples) {
+      for (int k = 0; k < samples.count; ++k)
+        if (samples.distance[k] < law.reach()) visit(samples, k);
+    });
+  }
   /// Part of the straight way from one configuration to another on which no sample passes the wall of its law: 1 where
   /// all of it is free. Conservative advancement (Li et al. 2021, Codimensional incremental potential contact, 4.2).
   double freeFraction(const Configuration &from, const Configuration &to) const;
@@ -68,6 +76,7 @@ private:
   std::array<AlignedVector, 3> seen_; ///< vertices where they were then [m]
   double seen_time_ = 0;              ///< obstacles where they were then [s]
 
+  int edgesOf(int chunk) const { return std::min(chunk_edges, rod_.edges - chunk * chunk_edges); }
   int chunks() const { return (rod_.edges + chunk_edges - 1) / chunk_edges; }
   double movedSince(const Configuration &c, int chunk) const;
   Samples samplesOf(const Configuration &c, int chunk, int collider, int first) const;
@@ -81,7 +90,7 @@ void RodContacts::visitNear(const Configuration &c, const Configuration *also, V
   for (int chunk = 0; chunk < chunks(); ++chunk) {
     const double moved = std::max(movedSince(c, chunk), also ? movedSince(*also, chunk) : 0);
     if (all_stood && moved < nearest_[chunk]) continue;
-    const int edges = std::min(chunk_edges, rod_.edges - chunk * chunk_edges);
+    const int edges = edgesOf(chunk);
     for (int k = 0; k < colliders; ++k) {
       const bool still = all_stood || !scene_.colliders[k].motion.moves();
       if (still && moved < away_[chunk * colliders + k]) continue;

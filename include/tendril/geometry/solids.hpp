@@ -11,7 +11,7 @@
 
 namespace tendril {
 
-/// Distance by the distances q and p from two families of faces, with its derivatives by them.
+/// Distance by the distances q and p from two families of faces.
 template <class T> T outsideBoth(const T &q, const T &p) {
   using std::max;
   using std::min;
