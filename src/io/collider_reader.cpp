@@ -119,7 +119,7 @@ void readSettings(YamlMap &map, const ContactKeys &keys, ContactSettings &out) {
   auto refuse = [&](KeyOf<KeyType::number> key, const char *law) {
     if (map.has(*key)) map.at(*key).fail("'" + std::string(key->name()) + "' is for 'law: " + law + "'");
   };
-  if (!out.isBarrier()) refuse(keys.distance, "penalty");
+  if (!out.isBarrier()) refuse(keys.distance, "barrier");
   if (out.isBarrier()) refuse(keys.threshold, "penalty");
   if (out.isBarrier()) refuse(keys.smoothing, "penalty");
   map.finish();

@@ -47,9 +47,12 @@ void IncrementalPotential::beginRod(const State &start, int r) {
 /// As far as they can go while the rod stays; the rest is left to the iterations.
 void IncrementalPotential::moveObstacles(int r) {
   constexpr double margin = 0.5; // closer, it would press harder than need be
-  iterate_.setObstacleTime(r, step_.time);
-  const double free = freeFraction(start_, iterate_, r);
-  if (free < 1) iterate_.setObstacleTime(r, start_time_ + margin * free * (step_.time - start_time_));
+  double free, part = 1;
+  for (int tries = 0; tries < 60; ++tries, part *= margin * free) { // a part of the time need not be that of the way
+    iterate_.setObstacleTime(r, part == 1 ? step_.time : start_time_ + part * (step_.time - start_time_));
+    free = freeFraction(start_, iterate_, r);
+    if (free == 1) break;
+  }
   for (auto &term : terms_) term->moveIterate(iterate_, r);
 }
 

@@ -173,6 +173,7 @@ rows = [
     ("rod in an obstacle", (support, support + "\ncolliders: [{name: floor, plane: {}, position: [0, 0.5, 0]}]"), [], ["deep in collider 'floor'", "at arc length", "contact: none"]),
     ("negative friction", (support, support + "\ncontact: {friction: -0.1}\ncolliders: [{plane: {}, position: [0, -1, 0]}]"), [], ["scene.yaml:9", "must not be negative"]),
     ("threshold of a barrier", (support, support + "\ncontact: {threshold: 1e-3}\ncolliders: [{plane: {}, position: [0, -1, 0]}]"), [], ["scene.yaml:9", "'threshold' is for 'law: penalty'"]),
+    ("distance of a penalty", (support, support + "\ncontact: {law: penalty, distance: 1e-3}\ncolliders: [{plane: {}, position: [0, -1, 0]}]"), [], ["scene.yaml:9", "'distance' is for 'law: barrier'"]),
     ("barrier wider than the rod", (support, support + "\ncontact: {distance: 1}\ncolliders: [{plane: {}, position: [0, -1, 0]}]"), [], ["'distance'", "must not exceed its radius"]),
     ("barrier without a radius", (support, support + "\ncontact: {radius: 0}\ncolliders: [{plane: {}, position: [0, -1, 0]}]"), [], ["contact radius 0", "law: penalty"]),
     ("law of no kind", (support, support + "\ncontact: {law: hard}\ncolliders: [{plane: {}, position: [0, -1, 0]}]"), [], ["scene.yaml:9", "barrier", "penalty"]),

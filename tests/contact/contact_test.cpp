@@ -283,6 +283,32 @@ TEST(Contact, ObstaclesThatMoveTakeRodsAlong) {
   for (const Vec3 &v : sim.state.velocity) EXPECT_NEAR(v[2], 0.2, 1e-3); // backward Euler damps the first jolt
 }
 
+/// A ram that has come down by 0.06 m after a fiftieth of the load step, on a rod held at both ends.
+TEST(Contact, ObstaclesThatMoveUnevenlyWithinAStepDoNotPass) {
+  for (const double corner : {0.02, 0.3}) {
+    Scene scene;
+    scene.gravity = Vec3::Zero();
+    scene.rods = {rubber(30, 0.5)};
+    scene.supports = {hold(scene, 0, 0, Support::Kind::pin), hold(scene, 0, 30, Support::Kind::pin)};
+    Collider ram = obstacle(makeCylinder(0.01, 0.3), Vec3(0.15, 0, 0.52));
+    ram.rotation = Eigen::AngleAxisd(pi / 2, Vec3::UnitX()).toRotationMatrix();
+    ram.motion.table = {{0, Vec3::Zero(), Vec3::Zero()},
+                        {corner, Vec3(0, 0, -0.06), Vec3::Zero()},
+                        {1, Vec3(0, 0, -0.06), Vec3::Zero()}};
+    scene.colliders = {ram};
+    Simulation sim;
+    const LoopSettings settings = statics();
+    EXPECT_PETSC(sim.setUp(scene, settings));
+    TimeLoop loop(sim.solver, settings);
+    bool finished = false;
+    EXPECT_PETSC(loop.run(
+        sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+    // Either it is taken along, to below the ram at 0.46 less both radii, or the run says that it failed.
+    if (finished) EXPECT_NEAR(sim.state.position[15][2], 0.46 - 0.015, 0.0005) << corner;
+    if (corner > 0.1) EXPECT_TRUE(finished) << loop.failure();
+  }
+}
+
 TEST(Contact, TellsWhereItIsTightest) {
   Scene scene;
   scene.rods = {rubber(20, 0.004)};
