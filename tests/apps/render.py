@@ -315,6 +315,15 @@ def wrong_input(tmp, helix):
         assert plotted.returncode == 1 and words in plotted.stderr and len(plotted.stderr.splitlines()) == 1, plotted
 
 
+def unit_of_work():
+    """CPU time of the same small work in numpy, in seconds: what this machine can do at the moment."""
+    before, values = time.process_time(), np.random.default_rng(0).random(1_000_000)
+    for _ in range(10):
+        np.sort(values)
+        np.sin(values)
+    return time.process_time() - before
+
+
 def helix_is_quick_and_the_same(tmp, helix):
     pictures = []
     for name in ("a.png", "b.png"):
@@ -322,8 +331,9 @@ def helix_is_quick_and_the_same(tmp, helix):
         render(helix, "--times", 0, 0.3, 0.7, 1.15, 1.6, "--out", f"{tmp}/{name}")
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-        print(f"helix, five instants, 1280x720: {spent:.1f} s CPU, {after.ru_maxrss / 1024:.0f} MB")
-        assert spent <= 8 and after.ru_maxrss <= 1.5 * 1024**2
+        units = spent / unit_of_work()
+        print(f"helix, five instants, 1280x720: {spent:.1f} s CPU, {units:.1f} units, {after.ru_maxrss / 1024:.0f} MB")
+        assert units <= 14 and after.ru_maxrss <= 1.5 * 1024**2  # 8.6 units where this was written
         pictures.append(open(f"{tmp}/{name}", "rb").read())
     assert pictures[0] == pictures[1], "the same file twice gives other bytes"
     render(helix, "--animate", "--seconds", 0.5, "--size", "160x90", "--out", f"{tmp}/x.webp")
