@@ -17,16 +17,28 @@ NormalLaw lawOf(const Scene &scene, const State &state, int r) {
   return {scene.rods[r].contact, state.contact_stiffness.empty() ? 0 : state.contact_stiffness[r]};
 }
 
+/// Sum of the momenta of the vertices of a rod, each relative to the obstacle nearest to it [kg m/s].
+double momentumTowards(const Scene &scene, const Elements &elements, const RodContacts &contacts, const State &state,
+                       double dt, int r) {
+  const RodRange &rod = elements.rods[r];
+  std::vector<std::array<Collider::Pose, 2>> poses;
+  for (const Collider &collider : scene.colliders)
+    poses.push_back({collider.poseAt(state.time), collider.poseAt(state.time + dt)});
+  double sum = 0;
+  for (int i = 0; i < rod.vertices; ++i) {
+    const auto &[from, to] = poses[contacts.nearestTo(i)];
+    const Vec3 &x = state.position[rod.first_vertex + i];
+    const Vec3 moved = to.fromLocal(from.toLocal(x)) - x;
+    sum += elements.mass()[rod.slot(i)] * (state.velocity[rod.first_vertex + i] - moved / dt).norm();
+  }
+  return sum;
+}
+
 /// Stiffness of the barrier of a rod [N/m]: ten times its weight per length, or where it has more to bear as much as
-/// keeps surfaces within the barrier; a power of four, so that it seldom changes from step to step.
-double barrierStiffness(const Scene &scene, const Elements &elements, const State &state, double dt, double pressure,
-                        int r) {
+/// keeps surfaces within the barrier; a power of four.
+double barrierStiffness(const Scene &scene, const Elements &elements, double force, double pressure, int r) {
   const Rod &rod = scene.rods[r];
-  const RodRange &range = elements.rods[r];
   const double length = elements.length(r);
-  double force = loadScale(scene, r, length);
-  for (int i = 0; i < range.vertices && dt > 0; ++i)
-    force += elements.mass()[range.slot(i)] * state.velocity[range.first_vertex + i].norm() / dt;
   double wanted = std::max(force / (20 * rod.contact.radius), 0.1 * pressure);
   if (rod.gravity) wanted = std::max(wanted, 10 * rod.material.linear_density * scene.gravity.norm());
   // Nothing pulls: what bends it by its own length.
@@ -55,14 +67,18 @@ public:
     if (!settings.isBarrier()) return;
     double stiffness = settings.stiffness;
     if (stiffness == 0) {
-      double pressure = 0;
-      if (!state.contact_stiffness.empty() && state.contact_stiffness[r] > 0) {
-        rod.setStiffness(state.contact_stiffness[r]);
-        rod.visitTouching(start, rod.law(), [&](const Samples &samples, int k) {
-          pressure = std::max(pressure, -rod.law()(samples.distance[k]).slope);
-        });
+      const double before = state.contact_stiffness.empty() ? 0 : state.contact_stiffness[r];
+      rod.setStiffness(before);
+      const double pressure = before > 0 ? largestPressure(rod, start) : 0;
+      // A barrier that grew while it is pressed would throw the rod off.
+      constexpr double bearable = 100;
+      if (!step.isStatic() && pressure > 0 && pressure <= bearable * before)
+        stiffness = before;
+      else {
+        double force = loadScale(scene_, r, elements_.length(r));
+        if (!step.isStatic()) force += momentumTowards(scene_, elements_, rod, state, step.dt, r) / step.dt;
+        stiffness = barrierStiffness(scene_, elements_, force, pressure, r);
       }
-      stiffness = barrierStiffness(scene_, elements_, state, step.dt, pressure, r);
     }
     rod.setStiffness(stiffness);
   }
@@ -121,21 +137,21 @@ public:
       spread(point.at, samples.slot[k], -(point.stiffness + point.curvature) * moved, out);
     });
   }
-  double workOfObstacles(const Configuration &c, double from, double to, int r) const override {
-    double work = 0;
-    if (!of_[r]) return work;
+  std::array<Vec3, 2> actionOfObstacle(int collider, const Configuration &c, int r) const override {
+    std::array<Vec3, 2> action{Vec3::Zero(), Vec3::Zero()};
+    if (!of_[r]) return action;
     const RodContacts &rod = *of_[r];
-    auto moved = [&](int collider, const Vec3 &x) {
-      const Collider &obstacle = scene_.colliders[collider];
-      return Vec3(obstacle.poseAt(to).fromLocal(x) - obstacle.poseAt(from).fromLocal(x));
+    const Mat3 rotation = scene_.colliders[collider].poseAt(c.obstacleTime(r)).rotation;
+    auto add = [&](const Vec3 &force, const Vec3 &local) {
+      action[0] += force;
+      action[1] += (rotation * local).cross(force);
     };
     rod.visitTouching(c, rod.law(), [&](const Samples &samples, int k) {
-      if (scene_.colliders[samples.collider].motion.moves())
-        work += contactPoint(scene_, rod, samples, k).force.dot(moved(samples.collider, samples.at(k)));
+      if (samples.collider == collider) add(contactPoint(scene_, rod, samples, k).force, samples.at(k));
     });
     for (const SlidingPoint &point : sliding_[r].points)
-      work -= forceOn(point, c, r).gradient.dot(moved(point.collider, point.touched));
-    return work;
+      if (point.collider == collider) add(-forceOn(point, c, r).gradient, point.touched);
+    return action;
   }
   double renew(const Configuration &iterate, int r) override {
     if (!of_[r] || !scene_.rods[r].contact.slides()) return 0;
@@ -191,6 +207,15 @@ private:
   /// Whether friction acts at the surface of a rod, whose frames it turns; cables have none.
   static bool carriesSurface(const Rod &rod) {
     return rod.contact.on && rod.contact.slides() && rod.contact.friction_at_surface && !rod.material.isCable();
+  }
+
+  /// Force per length of the sample that is pressed most, by the law that is set [N/m].
+  static double largestPressure(const RodContacts &rod, const Configuration &c) {
+    double most = 0;
+    rod.visitTouching(c, rod.law(), [&](const Samples &samples, int k) {
+      most = std::max(most, -rod.law()(samples.distance[k]).slope);
+    });
+    return most;
   }
 
   SlidingForce forceOn(const SlidingPoint &point, const Configuration &c, int r) const {

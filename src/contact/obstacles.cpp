@@ -137,8 +137,8 @@ double RodContacts::freeFraction(const Configuration &from, const Configuration 
       w.way = there.at(k) - w.from;
       w.length = w.way.norm();
       w.gap = here.distance[k] - wall;
-      if (!(w.gap <= w.length)) continue;
       w.stop = near * std::min(w.gap, settings_.isBarrier() ? settings_.distance : settings_.radius);
+      if (w.gap > w.length + w.stop) continue;
       w.done = 0;
       ways[count++] = w;
     }

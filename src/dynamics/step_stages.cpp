@@ -80,7 +80,7 @@ void TimeLoop::finish(const State &start, double h, RodSet rods, State *next) {
     }
 }
 
-/// What moving supports and constraints of some rods do at the stage just solved.
+/// What the moving holders of some rods do at the stage just solved.
 void TimeLoop::noteActions(RodSet rods) {
   for (int r = rods.begin; r < rods.end && !moving_.empty(); ++r)
     for (const int k : moving_of_[r]) {
@@ -97,17 +97,21 @@ Work TimeLoop::dynamicWork(const State &start, double h) const {
   Work work{workOfLoads(scene, potential.elements(), potential.start(), potential.iterate(), 1, 1), 0};
   if (moving_.empty()) return work;
   const std::vector<double> weights = integrator_->forceWeights(start, h, actions_.size());
-  const std::size_t n = actions_.back().size();
-  HolderActions mean(n, Vec3::Zero());
-  for (std::size_t j = 0; j < weights.size(); ++j)
-    for (std::size_t k = 0; k < n; ++k) {
+  const std::size_t n = actions_.back().size(),
+                    remembered = start.support_actions.size() % n == 0 ? start.support_actions.size() : 0;
+  auto mean = [&](std::size_t k) {
+    Vec3 sum = Vec3::Zero();
+    for (std::size_t j = 0; j < weights.size(); ++j) {
       const std::size_t past = (j - actions_.size()) * n + k;
-      mean[k] += weights[j] * (j < actions_.size()                   ? actions_[j][k]
-                               : past < start.support_actions.size() ? start.support_actions[past]
-                                                                     : actions_.back()[k]);
+      sum += weights[j] * (j < actions_.size() ? actions_[j][k]
+                           : past < remembered ? start.support_actions[past]
+                                               : actions_.back()[k]);
     }
-  work.supports = workOfSupports(scene, potential.elements(), potential.start(), potential.iterate(), start.time,
-                                 potential.step().time, mean);
+    return sum;
+  };
+  for (std::size_t k = 0; k < moving_.size(); ++k)
+    work.supports += workOf(moving_[k], {mean(2 * k), mean(2 * k + 1)}, potential.elements(), potential.start(),
+                            potential.iterate(), start.time, potential.step().time);
   return work;
 }
 

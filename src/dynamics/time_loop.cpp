@@ -77,9 +77,13 @@ PetscErrorCode TimeLoop::attempt(const State &state, State *next, Attempt *now) 
   PetscCall(solver_.solve(state, now->step, &now->report, Seek::minimum, guess ? &*guess : nullptr));
   solver_.on_block = nullptr;
   next->time = now->step.time;
-  if (now->report.converged) // here, for a search for critical points within the step moves the iterate
-    now->work =
-        staticWork(potential.scene(), potential.elements(), state, *next, potential.start(), potential.iterate());
+  if (!now->report.converged) PetscFunctionReturn(0);
+  // Here, for a search for critical points within the step moves the iterate.
+  now->work = staticWork(potential.scene(), potential.elements(), state, *next, potential.start(), potential.iterate());
+  for (const Holder &h : moving_)
+    if (h.collider)
+      now->work.supports += workOf(h, solver_.potential().actionOf(h), potential.elements(), potential.start(),
+                                   potential.iterate(), state.time, next->time);
   PetscFunctionReturn(0);
 }
 
@@ -87,7 +91,6 @@ void TimeLoop::Attempt::commit(const IncrementalPotential &potential, RodSet rod
   potential.commitConfiguration(*next, rods);
   energy += potential.energyBudget(*next, potential.iterate(), step.load_factor, rods);
   gap = std::min(gap, potential.smallestGap(rods));
-  obstacle_work += potential.workOfObstacles(rods);
 }
 
 /// Whether a critical point may lie within the step. Couples have no potential: the inertia of the symmetric part says
@@ -114,7 +117,6 @@ void TimeLoop::accept(State &state, State &next, Attempt *now, Work *work) {
     *work += now->work;
   std::swap(state, next);
   if (settings_.dynamic) work->supports += movedKinetic(state);
-  work->supports += now->obstacle_work;
   control.stable = now->report.negative_pivots == 0;
   control.rounding_sum =
       settings_.dynamic ? control.rounding_sum + now->report.rounding_error : now->report.rounding_error;
@@ -173,6 +175,8 @@ void TimeLoop::prepare(const State &state) {
     control.energy = potential.energyBudget(state, start, settings_.dynamic ? 1 : state.time, potential.all()).total();
   }
   moving_ = movingHolders(scene);
+  const std::vector<Holder> obstacles = movingObstacles(scene);
+  moving_.insert(moving_.end(), obstacles.begin(), obstacles.end());
   moving_of_.assign(moving_.empty() ? 0 : scene.rods.size(), {});
   for (std::size_t k = 0; k < moving_.size(); ++k) moving_of_[moving_[k].rod].push_back(int(k));
 }

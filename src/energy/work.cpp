@@ -70,23 +70,28 @@ double workOfLoads(const Scene &scene, const Elements &elements, const Configura
 std::vector<Holder> movingHolders(const Scene &scene) {
   std::vector<Holder> moving;
   for (const Support &s : scene.supports)
-    if (s.motion.moves()) moving.push_back({s.rod, &s.motion, &s, nullptr, int(&s - scene.supports.data())});
+    if (s.motion.moves()) moving.push_back({s.rod, &s.motion, int(&s - scene.supports.data()), &s});
   for (const Constraint &c : scene.constraints)
-    if (c.motion.moves()) moving.push_back({c.rod, &c.motion, nullptr, &c, int(&c - scene.constraints.data())});
+    if (c.motion.moves()) moving.push_back({c.rod, &c.motion, int(&c - scene.constraints.data()), nullptr, &c});
   return moving;
 }
 
-double workOfSupports(const Scene &scene, const Elements &elements, const Configuration &start,
-                      const Configuration &end, double from, double to, const HolderActions &actions) {
-  double sum = 0;
-  std::size_t next = 0;
-  for (const Holder &h : movingHolders(scene)) {
-    const Vec3 &force = actions[next++], &moment = actions[next++];
-    const Vec3 moved = h.support ? end.displacementAt(elements.rods[h.rod].slot(h.support->vertex), start)
-                                 : Vec3(h.motion->displacementAt(to) - h.motion->displacementAt(from));
-    sum += force.dot(moved) + moment.dot(h.motion->turnBetween(from, to));
-  }
-  return sum;
+std::vector<Holder> movingObstacles(const Scene &scene) {
+  std::vector<Holder> moving;
+  if (!scene.collidersMove()) return moving;
+  for (int r = 0; r < int(scene.rods.size()); ++r)
+    for (const Collider &c : scene.colliders)
+      if (scene.touches(r) && c.motion.moves())
+        moving.push_back({r, &c.motion, int(&c - scene.colliders.data()), nullptr, nullptr, &c});
+  return moving;
+}
+
+double workOf(const Holder &holder, const std::array<Vec3, 2> &action, const Elements &elements,
+              const Configuration &start, const Configuration &end, double from, double to) {
+  const Motion &motion = *holder.motion;
+  const Vec3 moved = holder.support ? end.displacementAt(elements.rods[holder.rod].slot(holder.support->vertex), start)
+                                    : Vec3(motion.displacementAt(to) - motion.displacementAt(from));
+  return action[0].dot(moved) + action[1].dot(motion.turnBetween(from, to));
 }
 
 Work staticWork(const Scene &scene, const Elements &elements, const State &before, const State &after,
@@ -94,10 +99,11 @@ Work staticWork(const Scene &scene, const Elements &elements, const State &befor
   Work work{workOfLoads(scene, elements, start, end, before.time, after.time), 0};
   const std::vector<Holder> moving = movingHolders(scene);
   if (moving.empty()) return work;
-  HolderActions mean = staticActions(scene, elements, before, moving);
-  const HolderActions last = staticActions(scene, elements, after, moving);
-  for (std::size_t k = 0; k < mean.size(); ++k) mean[k] = 0.5 * (mean[k] + last[k]);
-  work.supports = workOfSupports(scene, elements, start, end, before.time, after.time, mean);
+  const HolderActions first = staticActions(scene, elements, before, moving),
+                      last = staticActions(scene, elements, after, moving);
+  auto mean = [&](std::size_t k) { return Vec3(0.5 * (first[k] + last[k])); };
+  for (std::size_t k = 0; k < moving.size(); ++k)
+    work.supports += workOf(moving[k], {mean(2 * k), mean(2 * k + 1)}, elements, start, end, before.time, after.time);
   return work;
 }
 

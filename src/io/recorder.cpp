@@ -136,7 +136,9 @@ std::string Recorder::tellGrowth(bool finished) {
   growth << "the energy rose by " << std::setprecision(2) << gained_ / moved << " of the largest kinetic energy"
          << (work_ > 0 ? " and the work of loads and supports" : "") << " (at most " << passes
          << " passes), with nothing to put it in but -integrator " << options_.loop.integrator.name
-         << " in steps too long for it: shorten -dt, or take bdf2 or energy_momentum; "
+         << " in steps too long for it: shorten -dt, "
+         << (run_.scene.colliders.empty() ? "or take bdf2 or energy_momentum; "
+                                          : "give the impacts 'contact: {normal_damping: ...}', or take euler; ")
          << labelOf(run_.scene.rods[liveliest(run_)]) << " moves most";
   // A method that is unstable has made most of the motion itself.
   if (finished && gained_ > passes * moved + little) return growth.str();

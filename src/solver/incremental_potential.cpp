@@ -326,10 +326,13 @@ void IncrementalPotential::commit(State &state) const {
 
 std::array<Vec3, 2> IncrementalPotential::actionOf(const Holder &holder) {
   std::array<Vec3, 2> action{Vec3::Zero(), Vec3::Zero()};
-  const int slot = holder.support ? elements_.support_slot[holder.index] : elements_.constraint_slot[holder.index];
+  const int slot = holder.support      ? elements_.support_slot[holder.index]
+                   : holder.constraint ? elements_.constraint_slot[holder.index]
+                                       : -1;
   for (const auto &term : terms_) {
-    if (slot < 0) break;
-    const std::array<Vec3, 2> of_term = term->actionFrom(slot, iterate_, holder.rod);
+    if (slot < 0 && !holder.collider) break;
+    const std::array<Vec3, 2> of_term = holder.collider ? term->actionOfObstacle(holder.index, iterate_, holder.rod)
+                                                        : term->actionFrom(slot, iterate_, holder.rod);
     for (int k : {0, 1}) action[k] += of_term[k];
   }
   if (holder.support && holder.support->holdsPosition()) {

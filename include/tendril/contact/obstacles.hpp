@@ -6,6 +6,8 @@
 #include "tendril/contact/law.hpp"
 #include "tendril/state/state.hpp"
 
+#include <algorithm>
+
 namespace tendril {
 
 /// A point of an edge with its part of the edge's length.
@@ -50,6 +52,11 @@ public:
   /// all of it is free. Conservative advancement (Li et al. 2021, Codimensional incremental potential contact, 4.2).
   double freeFraction(const Configuration &from, const Configuration &to) const;
 
+  /// The obstacle that was nearest to the chunk of a vertex when it was looked at last.
+  int nearestTo(int vertex) const {
+    const auto of_chunk = away_.begin() + std::min(vertex / chunk_edges, chunks() - 1) * int(scene_.colliders.size());
+    return int(std::min_element(of_chunk, of_chunk + int(scene_.colliders.size())) - of_chunk);
+  }
   /// Smallest distance of samples from obstacles, between surfaces [m].
   double smallestGap(const Configuration &c) const;
 

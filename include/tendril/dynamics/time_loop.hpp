@@ -76,7 +76,7 @@ private:
   Integrator::Stages stages_;               ///< of the step under way
   double located_ = -1;                     ///< last critical load factor
   std::optional<Planes> mode_;              ///< critical mode along which the next step begins
-  std::vector<Holder> moving_;              ///< supports and constraints
+  std::vector<Holder> moving_;              ///< supports, constraints and obstacles
   std::vector<std::vector<int>> moving_of_; ///< per rod; empty where nothing moves
   std::vector<HolderActions> actions_;      ///< of those, at each stage of the step under way
 
@@ -92,9 +92,8 @@ private:
     double h = 0; ///< its length [s, or load factor]
     NewtonReport report;
     EnergyBudget energy;
-    Work work; ///< statics
-    double obstacle_work = 0; ///< [J]
-    double gap = HUGE_VAL;    ///< smallest between surfaces in contact [m]
+    Work work;             ///< statics
+    double gap = HUGE_VAL; ///< smallest between surfaces in contact [m]
     StepError error;
     bool too_coarse = false; ///< for the error asked for
     void commit(const IncrementalPotential &potential, RodSet rods, State *next);

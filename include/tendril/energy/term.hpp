@@ -87,10 +87,10 @@ public:
   /// Adds by how much its gradient changes when obstacles go on to a time and the rod stays, to first order.
   virtual void addObstacleMotion(const Configuration & /*iterate*/, double /*time*/, int /*rod*/,
                                  Planes & /*out*/) const {}
-  /// Work that obstacles do on a rod when they go from one time to another, by the forces at a configuration [J].
-  virtual double workOfObstacles(const Configuration & /*configuration*/, double /*from*/, double /*to*/,
-                                 int /*rod*/) const {
-    return 0;
+  /// What an obstacle does to a rod: force [N] and moment about its origin [N m].
+  virtual std::array<Vec3, 2> actionOfObstacle(int /*collider*/, const Configuration & /*configuration*/,
+                                               int /*rod*/) const {
+    return {Vec3::Zero(), Vec3::Zero()};
   }
   /// Takes what it took from before for constant anew from the iterate. \return by which part that changes its forces
   virtual double renew(const Configuration & /*iterate*/, int /*rod*/) { return 0; }

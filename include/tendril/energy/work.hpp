@@ -27,22 +27,25 @@ double coupleWork(const Vec3 &moment, double torque, const Vec3 &from, const Vec
 double workOfLoads(const Scene &scene, const Elements &elements, const Configuration &start, const Configuration &end,
                    double factor_start, double factor_end);
 
-/// What supports and constraints that move do to their rods, in the order of movingHolders: force [N], then moment
-/// about the vertex [N m] of each. The inertia of a held vertex itself is not in it: what it takes is the change of its
-/// kinetic energy.
+/// What holders do to their rods: force [N], then moment [N m] about the vertex, or the origin of the obstacle, of
+/// each. The inertia of a held vertex itself is not in it: what it takes is the change of its kinetic energy.
 using HolderActions = std::vector<Vec3>;
-/// Supports and constraints in one numbering, supports first.
+/// A support, a constraint or an obstacle that moves, with one of the rods that it acts on.
 struct Holder {
   int rod;
   const Motion *motion;
-  const Support *support;       ///< or null
-  const Constraint *constraint; ///< or null
-  int index;                    ///< among its kind
+  int index;                              ///< among its kind
+  const Support *support = nullptr;       ///< or null
+  const Constraint *constraint = nullptr; ///< or null
+  const Collider *collider = nullptr;     ///< or null
 };
+/// Supports and constraints in one numbering, supports first.
 std::vector<Holder> movingHolders(const Scene &scene);
-/// Work of these actions, constant between two times, by the displacements of vertices and the turning of frames [J].
-double workOfSupports(const Scene &scene, const Elements &elements, const Configuration &start,
-                      const Configuration &end, double from, double to, const HolderActions &actions);
+/// Obstacles with each rod that may touch them.
+std::vector<Holder> movingObstacles(const Scene &scene);
+/// Work of what a holder does, constant between two times, by the way and the turning of what it holds, or its own [J].
+double workOf(const Holder &holder, const std::array<Vec3, 2> &action, const Elements &elements,
+              const Configuration &start, const Configuration &end, double from, double to);
 
 /// Both between two equilibria at the load factors that are their times, by the trapezoidal rule.
 Work staticWork(const Scene &scene, const Elements &elements, const State &before, const State &after,

@@ -113,13 +113,6 @@ public:
   void addObstacleMotion(int rod, Planes &out) const {
     for (const auto &term : terms_) term->addObstacleMotion(iterate_, step_.time, rod, out);
   }
-  /// Work of obstacles that move on some rods since the step began, by the forces at the iterate [J].
-  double workOfObstacles(RodSet rods) const {
-    double work = 0;
-    for (int r = rods.begin; r < rods.end && obstacles_move_; ++r)
-      for (const auto &term : terms_) work += term->workOfObstacles(iterate_, start_time_, step_.time, r);
-    return work;
-  }
   /// Whether obstacles have not reached their places at the end of the step.
   bool obstaclesRemain(int rod) const { return obstacles_move_ && iterate_.obstacleTime(rod) != step_.time; }
   /// The same for all rods.

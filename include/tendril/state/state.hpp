@@ -33,7 +33,7 @@ struct State {
   std::vector<Rates> memory; ///< what the integrator remembers of steps before
   std::vector<double>
       strains; ///< before the last step, as strainsOf, then before the one before; where the integrator wants them
-  /// What supports and constraints that move did at the end of the last step, then of the one before (HolderActions);
+  /// What supports, constraints and obstacles that move did at the end of the last step, then of the one before (HolderActions);
   /// where the integrator wants them.
   std::vector<Vec3> support_actions;
   /// Stiffness of the barrier between each rod and obstacles in the last step; where there are obstacles [N/m].
