@@ -59,6 +59,15 @@ Vec3 Motion::angularVelocityAt(double time) const {
   return sine * rate + (1 - sine) * axis * axis.dot(rate) + cosine * axis.cross(rate);
 }
 
+double Motion::evenUntil(double from, double to) const {
+  constexpr double turn = 0.5;
+  const auto row =
+      std::upper_bound(table.begin(), table.end(), from, [](double t, const Motion::Key &k) { return t < k.time; });
+  const double next = row == table.end() ? to : std::min(to, row->time),
+               turned = (rotationVectorAt(next) - rotationVectorAt(from)).norm();
+  return turned > turn ? from + (next - from) * turn / turned : next;
+}
+
 Vec3 Motion::turnBetween(double from, double to) const {
   const int parts = 1 + int(2 * (rotationVectorAt(to) - rotationVectorAt(from)).norm());
   Vec3 sum = Vec3::Zero();

@@ -27,6 +27,12 @@ bool Scene::collidersMove() const {
   return std::any_of(colliders.begin(), colliders.end(), [](const Collider &c) { return c.motion.moves(); });
 }
 
+double Scene::collidersEvenUntil(double from, double to) const {
+  for (const Collider &c : colliders)
+    if (c.motion.moves()) to = c.motion.evenUntil(from, to);
+  return to;
+}
+
 bool Scene::strainsDissipate() const {
   return std::any_of(rods.begin(), rods.end(),
                      [](const Rod &rod) { return rod.material.stiffness_damping_coefficient != 0; }) ||

@@ -182,7 +182,7 @@ PetscErrorCode NewtonSolver::includeMotion(Vec y) {
     for (int a = 0; a < slot_size; ++a)
       std::copy(gradient[a] + rod.first_slot, gradient[a] + rod.vertexEnd() + 2, right[a] + rod.first_slot);
     potential_->blocks().multiply(rod, work_->motion, right);
-    if (potential_->obstaclesRemain(r)) potential_->addObstacleMotion(r, right);
+    if (potential_->obstaclesGo(r)) potential_->addObstacleMotion(r, right);
     dofs.fold(rod, right);
   }
   PetscCall(dofs.gather(right, rods_, right_, &work_->active));

@@ -14,7 +14,7 @@ IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, con
     : scene_(scene), dofs_(dofs), elements_(elements), retraction_(elements), axial_(scene, elements),
       terms_(makeTerms(scene, elements, axial_, dynamic)), supports_(scene, dofs, elements), start_(elements.slots),
       known_(elements.rods.size(), Known::nothing), scales_(rodScales(scene, elements)),
-      obstacles_move_(scene.collidersMove()) {}
+      obstacles_move_(scene.collidersMove()), obstacles_held_(scene.rods.size(), false) {}
 
 void IncrementalPotential::beginStep(const State &start, const Step &step) {
   start_time_ = start.time;
@@ -42,18 +42,6 @@ void IncrementalPotential::beginRod(const State &start, int r) {
   supports_.follow(r, iterate_);
   scales_[r].force = tendril::forceScale(scene_, elements_, step_, start, scales_[r], r);
   known_[r] = Known::nothing;
-}
-
-/// As far as they can go while the rod stays; the rest is left to the iterations.
-void IncrementalPotential::moveObstacles(int r) {
-  constexpr double margin = 0.5; // closer, it would press harder than need be
-  double free, part = 1;
-  for (int tries = 0; tries < 60; ++tries, part *= margin * free) { // a part of the time need not be that of the way
-    iterate_.setObstacleTime(r, part == 1 ? step_.time : start_time_ + part * (step_.time - start_time_));
-    free = freeFraction(start_, iterate_, r);
-    if (free == 1) break;
-  }
-  for (auto &term : terms_) term->moveIterate(iterate_, r);
 }
 
 void IncrementalPotential::setLoadFactor(double factor) {
@@ -211,19 +199,14 @@ void IncrementalPotential::setAxialForces(int r, const double *force) {
   known_[r] = Known::nothing;
 }
 
-double IncrementalPotential::freeFraction(const Configuration &from, const Configuration &to, int r) const {
-  double free = 1;
-  for (const auto &term : terms_) free = std::min(free, term->freeFraction(from, to, r));
-  return free;
-}
-
 bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r, RetractionKind kind,
                                    Configuration &trial, double *free) {
   if (trial.empty()) trial = iterate_;
   trial.copyEnds(elements_, r, iterate_);
-  if (obstaclesRemain(r)) {
+  if (obstaclesGo(r)) {
     const double now = iterate_.obstacleTime(r), part = std::clamp(scale, 0.0, 1.0);
-    trial.setObstacleTime(r, part == 1 ? step_.time : now + part * (step_.time - now));
+    const double next = nextObstacleTime(r);
+    trial.setObstacleTime(r, part == 1 ? next : now + part * (next - now));
   }
   if (!retraction_.apply(iterate_, increment, scale, r, kind, trial)) return false;
   const RodRange &rod = elements_.rods[r];

@@ -156,6 +156,7 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
   likely_ = std::sqrt(rtol);
   rtol_ = rtol *= sharpness_;
   report_.iterations = int(iteration);
+  constexpr double rtol_obstacles = 0.1;
   const bool moving = potential_->remainingMotion(rods_, work_->motion);
   bool done = true, finite = true, lost = false;
   creeps_ = false;
@@ -165,9 +166,14 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
     Residual &residual = work_->residual[r];
     if (work_->active[r]) { // a rod that has converged takes no part any more
       residual = potential_->residual(r, energyAtIterate(r));
-      work_->moving[r] = (moving && dot(rod, work_->motion, work_->motion) > 0) || potential_->obstaclesRemain(r);
+      // Obstacles go on with its moves; in statics from where forces nearly balance, for no inertia holds the rest.
+      const bool remain = potential_->obstaclesRemain(r),
+                 go = remain && (!potential_->step().isStatic() || excess(residual, rtol_obstacles) <= 1 ||
+                                 isAtNoise(residual, rtol_obstacles));
+      potential_->holdObstacles(r, !go);
+      work_->moving[r] = (moving && dot(rod, work_->motion, work_->motion) > 0) || go;
       finite = finite && residual.isFinite();
-      const Verdict verdict = residual.isFinite() && !work_->moving[r] ? judge(r, rtol) : Verdict::going;
+      const Verdict verdict = residual.isFinite() && !work_->moving[r] && !remain ? judge(r, rtol) : Verdict::going;
       lost = lost || verdict == Verdict::lost;
       creeps_ = creeps_ || verdict == Verdict::saddle;
       work_->active[r] = verdict != Verdict::answer;

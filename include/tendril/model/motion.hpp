@@ -31,6 +31,8 @@ struct Motion {
   /// Sum of the rotation vectors of its parts between two times, each of less than half a radian: whole turns are
   /// counted [rad].
   Vec3 turnBetween(double from, double to) const;
+  /// The latest time up to another, later one until which it goes straight and turns by less than half a radian.
+  double evenUntil(double from, double to) const;
 };
 
 } // namespace tendril

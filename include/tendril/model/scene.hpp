@@ -130,6 +130,8 @@ struct Scene {
   /// Whether anything dissipates by the rate of its strains: the stiffness of a rod, or a constraint.
   bool strainsDissipate() const;
   bool collidersMove() const;
+  /// The latest time up to another, later one until which all obstacles move evenly (Motion::evenUntil).
+  double collidersEvenUntil(double from, double to) const;
   /// Whether a rod may touch anything.
   bool touches(int rod) const { return !colliders.empty() && rods[rod].contact.on; }
 };

@@ -111,10 +111,15 @@ public:
   }
   /// Adds what their way to those does to the gradient, to first order.
   void addObstacleMotion(int rod, Planes &out) const {
-    for (const auto &term : terms_) term->addObstacleMotion(iterate_, step_.time, rod, out);
+    for (const auto &term : terms_) term->addObstacleMotion(iterate_, nextObstacleTime(rod), rod, out);
   }
+  /// Up to when they can go in one move.
+  double nextObstacleTime(int rod) const { return scene_.collidersEvenUntil(iterate_.obstacleTime(rod), step_.time); }
   /// Whether obstacles have not reached their places at the end of the step.
   bool obstaclesRemain(int rod) const { return obstacles_move_ && iterate_.obstacleTime(rod) != step_.time; }
+  /// Whether they go on with the moves of a rod, or wait for it.
+  bool obstaclesGo(int rod) const { return obstaclesRemain(rod) && !obstacles_held_[rod]; }
+  void holdObstacles(int rod, bool held) { obstacles_held_[rod] = held; }
   /// The same for all rods.
   bool tryMove(const Planes &increment, double scale, Configuration &trial);
   /// Makes the trial of one rod, or of all, the iterate.
@@ -193,6 +198,7 @@ private:
   std::vector<RodScale> scales_;
 
   bool obstacles_move_;
+  std::vector<char> obstacles_held_; ///< per rod
 
   void moveObstacles(int rod);
   double freeFraction(const Configuration &from, const Configuration &to, int rod) const;
