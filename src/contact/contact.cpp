@@ -56,6 +56,7 @@ public:
     for (int r = 0; r < int(scene.rods.size()); ++r)
       of_.push_back(scene.touches(r) ? std::make_unique<RodContacts>(scene, elements, r) : nullptr);
     sliding_.resize(of_.size());
+    slides_ = scene.slides();
   }
 
   void beginStep(const State &state, const Configuration &start, const Step &step, int r) override {
@@ -63,24 +64,8 @@ public:
     RodContacts &rod = *of_[r];
     rod.look(start, true);
     const ContactSettings &settings = scene_.rods[r].contact;
+    if (settings.isBarrier()) setStiffness(state, start, step, r);
     if (settings.slides()) beginSliding(state, start, step, r);
-    if (!settings.isBarrier()) return;
-    double stiffness = settings.stiffness;
-    if (stiffness == 0) {
-      const double before = state.contact_stiffness.empty() ? 0 : state.contact_stiffness[r];
-      rod.setStiffness(before);
-      const double pressure = before > 0 ? largestPressure(rod, start) : 0;
-      // A barrier that grew while it is pressed would throw the rod off.
-      constexpr double bearable = 100;
-      if (!step.isStatic() && pressure > 0 && pressure <= bearable * before)
-        stiffness = before;
-      else {
-        double force = loadScale(scene_, r, elements_.length(r));
-        if (!step.isStatic()) force += momentumTowards(scene_, elements_, rod, state, step.dt, r) / step.dt;
-        stiffness = barrierStiffness(scene_, elements_, force, pressure, r);
-      }
-    }
-    rod.setStiffness(stiffness);
   }
   void moveIterate(const Configuration &iterate, int r) override {
     if (of_[r]) of_[r]->look(iterate, false);
@@ -156,6 +141,8 @@ public:
   double renew(const Configuration &iterate, int r) override {
     if (!of_[r] || !scene_.rods[r].contact.slides()) return 0;
     OfSliding &sliding = sliding_[r];
+    const Sliding held = sliding.sliding;
+    sliding.sliding.holds = false;
     std::vector<SlidingPoint> now = slidingPoints(iterate, of_[r]->law(), r);
     double change = 0, size = 0;
     auto same = [](const SlidingPoint &a, const SlidingPoint &b) {
@@ -169,7 +156,7 @@ public:
                                       [&](const SlidingPoint &old) { return same(old, point); });
       Vec3 before = Vec3::Zero();
       if (found != sliding.points.end()) {
-        before = forceOn(*found, iterate, r).gradient;
+        before = forceOn(*found, held, iterate, r).gradient;
         next = std::size_t(found - sliding.points.begin()) + 1;
       }
       change += (force.gradient - before).norm();
@@ -188,9 +175,15 @@ public:
   double smallestGap(const Configuration &c, int r) const override {
     return of_[r] ? of_[r]->smallestGap(c) : HUGE_VAL;
   }
-  void commit(State &state, int r) const override {
+  void commit(State &state, const Configuration &c, int r) const override {
     if (state.contact_stiffness.empty()) state.contact_stiffness.assign(scene_.rods.size(), 0);
     if (of_[r]) state.contact_stiffness[r] = of_[r]->law().stiffness();
+    if (!slides_) return;
+    state.contacts.resize(scene_.rods.size());
+    state.contacts[r].clear();
+    for (const SlidingPoint &point : sliding_[r].points) state.contacts[r].push_back(memoryOf(point, c, r));
+    std::sort(state.contacts[r].begin(), state.contacts[r].end(),
+              [](const ContactMemory &a, const ContactMemory &b) { return a.key() < b.key(); });
   }
 
 private:
@@ -201,12 +194,30 @@ private:
     std::vector<SlidingPoint> points;
     Sliding sliding;
     const Configuration *start = nullptr;
+    bool anchored = false;
+    std::vector<ContactMemory> before; ///< at the start of the step
   };
+  bool slides_ = false;
   std::vector<OfSliding> sliding_; ///< per rod
 
-  /// Whether friction acts at the surface of a rod, whose frames it turns; cables have none.
-  static bool carriesSurface(const Rod &rod) {
-    return rod.contact.on && rod.contact.slides() && rod.contact.friction_at_surface && !rod.material.isCable();
+  void setStiffness(const State &state, const Configuration &start, const Step &step, int r) {
+    RodContacts &rod = *of_[r];
+    double stiffness = scene_.rods[r].contact.stiffness;
+    if (stiffness == 0) {
+      const double before = state.contact_stiffness.empty() ? 0 : state.contact_stiffness[r];
+      rod.setStiffness(before);
+      const double pressure = before > 0 ? largestPressure(rod, start) : 0;
+      // A barrier that grew while it is pressed would throw the rod off.
+      constexpr double bearable = 100;
+      if (!step.isStatic() && pressure > 0 && pressure <= bearable * before)
+        stiffness = before;
+      else {
+        double force = loadScale(scene_, r, elements_.length(r));
+        if (!step.isStatic()) force += momentumTowards(scene_, elements_, rod, state, step.dt, r) / step.dt;
+        stiffness = barrierStiffness(scene_, elements_, force, pressure, r);
+      }
+    }
+    rod.setStiffness(stiffness);
   }
 
   /// Force per length of the sample that is pressed most, by the law that is set [N/m].
@@ -219,8 +230,11 @@ private:
   }
 
   SlidingForce forceOn(const SlidingPoint &point, const Configuration &c, int r) const {
+    return forceOn(point, sliding_[r].sliding, c, r);
+  }
+  SlidingForce forceOn(const SlidingPoint &point, const Sliding &sliding, const Configuration &c, int r) const {
     const Collider::Pose pose = scene_.colliders[point.collider].poseAt(c.obstacleTime(r));
-    return slidingForce(point, scene_.rods[r].contact, sliding_[r].sliding, wayOf(point, c, pose));
+    return slidingForce(point, scene_.rods[r].contact, sliding, wayOf(point, c, pose));
   }
 
   void beginSliding(const State &state, const Configuration &start, const Step &step, int r) {
@@ -228,9 +242,42 @@ private:
     // Where a method asks for the forces of its start, no time has gone.
     const double time = step.isStatic() ? 0 : step.time > state.time ? step.time - state.time : step.dt;
     OfSliding &sliding = sliding_[r];
-    sliding.sliding = {step.isStatic() ? settings.slip_length : settings.fall_off_velocity * time, time};
+    sliding.anchored = settings.isAnchored(step.isStatic());
+    sliding.sliding = {sliding.anchored || step.isStatic() ? settings.slip_length : settings.fall_off_velocity * time,
+                       time};
     sliding.start = &start;
-    sliding.points = slidingPoints(start, lawOf(scene_, state, r), r);
+    if (state.contacts.empty())
+      sliding.before.clear();
+    else
+      sliding.before = state.contacts[r];
+    sliding.sliding.holds = step.isStatic(); // until it is known what presses, or loads of later would find no friction
+    sliding.points = slidingPoints(start, state.contact_stiffness.empty() ? of_[r]->law() : lawOf(scene_, state, r), r);
+  }
+
+  /// What a point remembers. Where it slides, its anchor follows within the fall-off.
+  ContactMemory memoryOf(const SlidingPoint &point, const Configuration &c, int r) const {
+    const OfSliding &sliding = sliding_[r];
+    const Collider::Pose pose = scene_.colliders[point.collider].poseAt(c.obstacleTime(r));
+    const Vec3 way = wayOf(point, c, pose);
+    ContactMemory memory{point.slot - elements_.rods[r].first_slot, point.point, point.collider, Vec3::Zero(),
+                         -slidingForce(point, scene_.rods[r].contact, sliding.sliding, way).gradient};
+    if (!sliding.anchored) return memory;
+    const Vec3 drawn = way - point.normal.dot(way) * point.normal + point.stick;
+    memory.stick =
+        pose.rotation.transpose() * drawn * std::min(1.0, sliding.sliding.fall_off / std::max(drawn.norm(), 1e-300));
+    return memory;
+  }
+  /// Adds what a point remembers from before the step.
+  void recall(SlidingPoint *point, const Mat3 &rotation, int r) const {
+    const OfSliding &sliding = sliding_[r];
+    const auto key = std::tuple(point->slot - elements_.rods[r].first_slot, point->collider, point->point);
+    const auto found = std::lower_bound(sliding.before.begin(), sliding.before.end(), key,
+                                        [](const ContactMemory &m, const auto &k) { return m.key() < k; });
+    if (found == sliding.before.end() || found->key() != key) return;
+    point->held = found->friction;
+    if (!sliding.anchored) return;
+    const Vec3 drawn = rotation * found->stick;
+    point->stick = drawn - point->normal.dot(drawn) * point->normal;
   }
 
   /// What touches at a configuration, by a law.
@@ -240,24 +287,31 @@ private:
     const Configuration &start = *sliding_[r].start;
     std::vector<SlidingPoint> points;
     contacts.visitTouching(c, law, [&](const Samples &samples, int k) {
-      const double force = -contacts.weight(samples, k) * law(samples.distance[k]).slope;
-      if (!(force > 0)) return;
+      const double slope = law(samples.distance[k]).slope;
+      const bool holds = sliding_[r].sliding.holds;
+      if (!(slope < 0 || holds)) return;
       const ContactPoint contact = contactPoint(scene_, contacts, samples, k);
+      const double steep = contact.normal.norm(); // not 1 where distances are interpolated
+      const Vec3 normal = contact.normal / steep;
       const Collider &collider = scene_.colliders[samples.collider];
       SlidingPoint point{};
       point.slot = samples.slot[k];
       point.point = samples.point[k];
       point.collider = samples.collider;
       point.at = contact.at;
-      point.pressing = force;
+      point.pressing = -contacts.weight(samples, k) * slope * steep;
       point.coefficient =
           collider.friction < 0 ? rod.contact.friction : std::sqrt(rod.contact.friction * collider.friction);
-      point.normal = contact.normal;
+      point.normal = normal;
       point.touched = samples.at(k);
       if (carriesSurface(rod)) {
-        point.touched -= rod.contact.radius * (samples.pose.rotation.transpose() * contact.normal);
-        point.arm = -rod.contact.radius * (matrixOf(c.frameAt(point.slot)).transpose() * contact.normal);
+        point.touched -= rod.contact.radius * (samples.pose.rotation.transpose() * normal);
+        point.arm = -rod.contact.radius * (matrixOf(c.frameAt(point.slot)).transpose() * normal);
       }
+      recall(&point, samples.pose.rotation, r);
+      if (holds) // as if it were pressed by the width of its law
+        point.pressing = point.coefficient * contacts.weight(samples, k) * law.stiffness() *
+                         (rod.contact.isBarrier() ? 1 : law.reach());
       point.start = wayOf(point, start, collider.poseAt(start.obstacleTime(r)));
       points.push_back(point);
     });
@@ -266,62 +320,6 @@ private:
 };
 
 } // namespace
-
-ContactPoint contactPoint(const Scene &scene, const RodContacts &rod, const Samples &samples, int k) {
-  const Distance d = scene.colliders[samples.collider].shape->at(samples.at(k));
-  const GapLaw law = rod.law()(samples.distance[k]);
-  const double weight = rod.weight(samples, k);
-  const Mat3 &q = samples.pose.rotation;
-  ContactPoint point;
-  point.at = rod.points(samples.collider)[samples.point[k]].at;
-  point.normal = q * d.gradient;
-  point.force = -weight * law.slope * point.normal;
-  point.stiffness = weight * law.curvature * point.normal * point.normal.transpose();
-  point.curvature = weight * law.slope * (q * d.hessian * q.transpose());
-  return point;
-}
-
-std::vector<Vec3> contactForces(const Scene &scene, const Elements &elements, const State &state,
-                                const Configuration &c) {
-  std::vector<Vec3> force(elements.vertices(), Vec3::Zero());
-  for (int r = 0; r < int(scene.rods.size()); ++r) {
-    if (!scene.touches(r)) continue;
-    RodContacts rod(scene, elements, r);
-    if (!state.contact_stiffness.empty()) rod.setStiffness(state.contact_stiffness[r]);
-    rod.look(c, true);
-    const RodRange &range = elements.rods[r];
-    rod.visitTouching(c, rod.law(), [&](const Samples &samples, int k) {
-      const ContactPoint point = contactPoint(scene, rod, samples, k);
-      const int i = samples.slot[k] - range.first_slot;
-      force[range.first_vertex + i] += (1 - point.at) * point.force;
-      force[range.first_vertex + (i + 1) % range.vertices] += point.at * point.force;
-    });
-  }
-  return force;
-}
-
-std::vector<Touch> tightest(const Scene &scene, const Elements &elements, const Configuration &c) {
-  std::vector<Touch> found;
-  for (int r = 0; r < int(scene.rods.size()); ++r) {
-    if (!scene.touches(r)) continue;
-    RodContacts rod(scene, elements, r);
-    rod.look(c, true);
-    std::vector<Touch> of_rod(scene.colliders.size());
-    rod.visitNear(c, nullptr, [&](const Samples &samples) {
-      for (int k = 0; k < samples.count; ++k) {
-        Touch &worst = of_rod[samples.collider];
-        if (samples.distance[k] >= worst.gap) continue;
-        const double at = rod.points(samples.collider)[samples.point[k]].at;
-        double arc = 0;
-        for (int s = elements.rods[r].first_slot; s < samples.slot[k]; ++s) arc += elements.restLength()[s];
-        worst = {r, samples.collider, samples.distance[k], arc + at * elements.restLength()[samples.slot[k]]};
-      }
-    });
-    std::copy_if(of_rod.begin(), of_rod.end(), std::back_inserter(found), [](const Touch &t) { return t.rod >= 0; });
-  }
-  std::stable_sort(found.begin(), found.end(), [](const Touch &a, const Touch &b) { return a.gap < b.gap; });
-  return found;
-}
 
 std::unique_ptr<Term> makeContact(const Scene &scene, const Elements &elements) {
   if (scene.colliders.empty()) return nullptr;

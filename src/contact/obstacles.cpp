@@ -20,7 +20,9 @@ std::vector<SamplePoint> samplePoints(int quadrature, double longest_edge, doubl
 
 RodContacts::RodContacts(const Scene &scene, const Elements &elements, int rod)
     : scene_(scene), elements_(elements), settings_(scene.rods[rod].contact), rod_(elements.rods[rod]), index_(rod),
-      law_(settings_, settings_.stiffness), away_(chunks() * scene.colliders.size(), 0), nearest_(chunks(), 0) {
+      law_(settings_, settings_.stiffness), away_(chunks() * scene.colliders.size(), HUGE_VAL), nearest_(chunks(), 0) {
+  for (int k = 0; k < int(scene.colliders.size()); ++k)
+    if (std::find(settings_.passes.begin(), settings_.passes.end(), k) == settings_.passes.end()) met_.push_back(k);
   double longest = 0;
   for (int s = rod_.first_slot; s < rod_.edgeEnd(); ++s) longest = std::max(longest, elements.restLength()[s]);
   // A tube of this radius against a surface that curves as much touches it along about twice this length.
@@ -60,7 +62,7 @@ void RodContacts::look(const Configuration &c, bool all) {
       if (i + 1 < begin + count) longest = std::max(longest, c[C::length][rod_.slot(i)]);
     }
     nearest_[chunk] = HUGE_VAL;
-    for (int k = 0; k < colliders; ++k) {
+    for (const int k : met_) {
       const Collider::Pose pose = scene_.colliders[k].poseAt(time);
       std::array<std::array<double, chunk_edges + 1>, 3> local;
       std::array<double, chunk_edges + 1> distance;
@@ -106,7 +108,7 @@ double RodContacts::smallestGap(const Configuration &c) const {
   for (int chunk = 0; chunk < chunks(); ++chunk) {
     const double moved = movedSince(c, chunk);
     const int edges = edgesOf(chunk);
-    for (int k = 0; k < colliders; ++k) {
+    for (const int k : met_) {
       if (stood && away_[chunk * colliders + k] - moved + law_.reach() >= least) continue;
       for (int first = 0; first < edges * int(points_[k].size()); first += Samples::most) {
         const Samples samples = samplesOf(c, chunk, k, first);

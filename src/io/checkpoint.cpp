@@ -52,6 +52,31 @@ struct Contents {
   std::size_t strain_row = 0;
 };
 
+/// Per rod a number of rows of 3 + 6 numbers (ContactMemory).
+template <class Archive, class AnyState, class Whole> void exchangeContacts(Archive &a, AnyState &s, Whole &whole) {
+  std::size_t rods = s.contacts.size(), total = 0;
+  std::vector<double> counts;
+  std::vector<Vec3> rows;
+  for (const auto &of_rod : s.contacts) {
+    counts.push_back(double(of_rod.size()));
+    for (const ContactMemory &m : of_rod)
+      rows.insert(rows.end(), {Vec3(m.edge, m.point, m.collider), m.stick, m.friction});
+  }
+  total = rows.size();
+  whole("rods_with_friction", rods, 1e15);
+  whole("contact_rows", total, 1e15);
+  a.array("contact_counts", counts, rods);
+  a.array("contact_memory", rows, total);
+  if constexpr (Archive::reads) {
+    s.contacts.assign(rods, {});
+    std::size_t next = 0;
+    for (std::size_t r = 0; r < rods; ++r)
+      for (double n = 0; n < counts[r] && next + 3 <= rows.size(); ++n, next += 3)
+        s.contacts[r].push_back(
+            {int(rows[next][0]), int(rows[next][1]), int(rows[next][2]), rows[next + 1], rows[next + 2]});
+  }
+}
+
 template <class Archive, class AnyContents> void exchange(Archive &a, AnyContents &c, const Elements &elements) {
   auto whole = [&](const char *name, auto &value, [[maybe_unused]] double most) {
     if constexpr (Archive::reads)
@@ -102,6 +127,8 @@ template <class Archive, class AnyContents> void exchange(Archive &a, AnyContent
   std::size_t stiffness = s.contact_stiffness.size();
   whole("rods_in_contact", stiffness, 1e15);
   a.array("contact_stiffness", s.contact_stiffness, stiffness);
+  if (a.format_version < 5) return;
+  exchangeContacts(a, s, whole);
 }
 
 /// Whole turns of cells that were others in the checkpoint: the twist of a vertex along the rod stays what it was, by
@@ -141,6 +168,7 @@ void beginAnew(const Simulation &run, State *state, std::vector<std::string> *to
   state->strains.clear();
   state->support_actions.clear();
   state->contact_stiffness.clear();
+  state->contacts.clear();
   state->last_dt = state->dt_before = 0;
   const Configuration c = configurationOf(*state, run.scene, *run.elements, state->time);
   for (std::size_t r = 0; r < run.elements->rods.size(); ++r) {
@@ -316,6 +344,9 @@ void adapt(Found *f, const std::vector<double> &places, const Simulation &run, c
   const std::vector<double> &cells = f->contents.cells;
   const bool other_cells = !cells.empty() && cells != places;
   if (cells.empty() && s.winding.size() != places.size()) s.winding.assign(places.size(), 0.0);
+  const std::size_t rods = run.elements->rods.size();
+  if (s.contact_stiffness.size() < rods) s.contact_stiffness.clear();
+  if (s.contacts.size() != rods) s.contacts.clear();
   if (!f->same_method) {
     s.memory.clear();
     s.strains.clear();

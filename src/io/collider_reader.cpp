@@ -4,6 +4,7 @@
 #include "tendril/io/support_reader.hpp"
 #include "tendril/io/text.hpp"
 
+#include <algorithm>
 #include <filesystem>
 
 namespace tendril {
@@ -81,18 +82,18 @@ constexpr ShapeKey shape_keys[] = {
      }}};
 
 struct ContactKeys {
-  KeyOf<KeyType::word, KeyType::word_or_map> law, friction_at, quadrature;
+  KeyOf<KeyType::word, KeyType::word_or_map> law, friction_at, quadrature, stick;
   KeyOf<KeyType::number> radius, distance, stiffness, threshold, smoothing, friction, fall_off_velocity, slip_length,
       tangential_damping, normal_damping;
 };
 // clang-format off
 constexpr ContactKeys of_scene{
-    "contact.law", "contact.friction_at", "contact.quadrature", "contact.radius", "contact.distance",
-    "contact.stiffness", "contact.threshold", "contact.smoothing", "contact.friction", "contact.fall_off_velocity",
+    "contact.law", "contact.friction_at", "contact.quadrature", "contact.stick", "contact.radius",
+    "contact.distance", "contact.stiffness", "contact.threshold", "contact.smoothing", "contact.friction", "contact.fall_off_velocity",
     "contact.slip_length", "contact.tangential_damping", "contact.normal_damping"};
 constexpr ContactKeys of_rod{
-    "rods[].contact.law", "rods[].contact.friction_at", "rods[].contact.quadrature", "rods[].contact.radius",
-    "rods[].contact.distance", "rods[].contact.stiffness", "rods[].contact.threshold", "rods[].contact.smoothing",
+    "rods[].contact.law", "rods[].contact.friction_at", "rods[].contact.quadrature", "rods[].contact.stick",
+    "rods[].contact.radius", "rods[].contact.distance", "rods[].contact.stiffness", "rods[].contact.threshold", "rods[].contact.smoothing",
     "rods[].contact.friction", "rods[].contact.fall_off_velocity", "rods[].contact.slip_length",
     "rods[].contact.tangential_damping", "rods[].contact.normal_damping"};
 // clang-format on
@@ -101,8 +102,18 @@ void readSettings(YamlMap &map, const ContactKeys &keys, ContactSettings &out) {
   auto read = [&](KeyOf<KeyType::number> key, double &value) {
     if (map.has(*key)) value = map.number(key);
   };
-  if (map.has(*keys.law))
-    out.law = map.word(keys.law) == "penalty" ? ContactSettings::Law::penalty : ContactSettings::Law::barrier;
+  if (map.has(*keys.law)) {
+    using Law = ContactSettings::Law;
+    const Law law = map.word(keys.law) == "penalty" ? Law::penalty : Law::barrier;
+    if (law != out.law) { // what the scene says of the other law has no meaning here
+      const ContactSettings fresh;
+      out.stiffness = fresh.stiffness;
+      out.threshold = fresh.threshold;
+      out.smoothing = fresh.smoothing;
+      out.distance = std::nan("");
+    }
+    out.law = law;
+  }
   read(keys.radius, out.radius);
   read(keys.distance, out.distance);
   read(keys.stiffness, out.stiffness);
@@ -113,6 +124,8 @@ void readSettings(YamlMap &map, const ContactKeys &keys, ContactSettings &out) {
   read(keys.slip_length, out.slip_length);
   read(keys.tangential_damping, out.tangential_damping);
   read(keys.normal_damping, out.normal_damping);
+  if (map.has(*keys.stick))
+    out.stick = map.word(keys.stick) == "creep" ? ContactSettings::Stick::creep : ContactSettings::Stick::anchored;
   if (map.has(*keys.friction_at)) out.friction_at_surface = map.word(keys.friction_at) == "surface";
   if (map.has(*keys.quadrature))
     out.quadrature = map.word(keys.quadrature) == "auto" ? 0 : std::stoi(map.word(keys.quadrature));
@@ -132,6 +145,7 @@ ContactSettings readContact(YamlMap &scene) {
   settings.radius = settings.distance = std::nan("");
   if (scene.has("contact")) {
     YamlMap map(scene.at("contact"), "contact");
+    (void)map.has("contact.ignore"); // for readIgnored
     readSettings(map, of_scene, settings);
   }
   return settings;
@@ -145,6 +159,31 @@ void readContact(YamlMap &rod, ContactSettings &settings) {
     readSettings(map, of_rod, settings);
   } else
     settings.on = rod.word("rods[].contact") != "none";
+}
+
+void readIgnored(YamlMap &scene, SceneFile &out) {
+  if (!scene.has("contact")) return;
+  YamlMap contact(scene.at("contact"), "contact");
+  if (!contact.has("contact.ignore")) return;
+  for (const YamlValue &value : contact.at("contact.ignore").items()) {
+    YamlMap map(value, "contact.ignore");
+    const YamlValue of_rods = map.at("contact.ignore[].rods"), of_colliders = map.at("contact.ignore[].colliders");
+    const std::string word = of_rods.text(), name = of_colliders.text();
+    std::vector<int> rods = out.names.find(word), colliders;
+    for (int r = 0; r < int(out.scene.rods.size()); ++r)
+      if (out.scene.rods[r].layer == word) rods.push_back(r);
+    for (int k = 0; k < int(out.scene.colliders.size()); ++k)
+      if (out.scene.colliders[k].name == name || out.scene.colliders[k].layer == name) colliders.push_back(k);
+    if (rods.empty()) of_rods.fail("no rod has the name or layer '" + inOneLine(word) + "'");
+    if (colliders.empty()) of_colliders.fail("no collider has the name or layer '" + inOneLine(name) + "'");
+    for (const int r : rods) {
+      std::vector<int> &passes = out.scene.rods[r].contact.passes;
+      passes.insert(passes.end(), colliders.begin(), colliders.end());
+      std::sort(passes.begin(), passes.end());
+      passes.erase(std::unique(passes.begin(), passes.end()), passes.end());
+    }
+    map.finish();
+  }
 }
 
 void completeContact(const YamlValue &colliders, Scene &scene) {
@@ -189,6 +228,7 @@ void readCollider(const YamlValue &value, Scene &scene) {
     map.refuseUnknown();
     value.fail("a collider needs a shape: plane, sphere, capsule, cylinder, box, tube or mesh");
   }
+  if (map.has("colliders[].layer")) c.layer = readName(map.at("colliders[].layer"));
   c.position = map.vector("colliders[].position");
   const Vec3 rotation = map.vector("colliders[].rotation");
   if (rotation.norm() > 0) turn = Eigen::AngleAxisd(rotation.norm(), rotation.normalized()).toRotationMatrix() * turn;

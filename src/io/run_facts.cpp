@@ -57,13 +57,17 @@ std::string textOf(const Constraint &c) {
 
 std::string textOf(const ContactSettings &c) {
   if (!c.on) return "none";
+  std::string passes, stick;
+  for (const int k : c.passes) passes += (passes.empty() ? ", passes collider " : " and ") + std::to_string(k);
+  if (c.stick != ContactSettings::Stick::by_mode)
+    stick = c.stick == ContactSettings::Stick::creep ? ", creeping" : ", anchored";
   return std::string(c.isBarrier() ? "barrier of width " + textOf(c.distance)
                                    : "penalty from " + textOf(c.threshold) + ", smoothing " + textOf(c.smoothing)) +
          ", radius " + textOf(c.radius) + ", stiffness " + textOf(c.stiffness) + ", quadrature " +
          std::to_string(c.quadrature) + ", friction " + textOf(c.friction) +
          (c.friction_at_surface ? " at the surface" : " at the centreline") + ", falling off below " +
          textOf(c.fall_off_velocity) + " and " + textOf(c.slip_length) + ", damping " + textOf(c.tangential_damping) +
-         " and " + textOf(c.normal_damping);
+         " and " + textOf(c.normal_damping) + stick + passes;
 }
 
 std::string textOf(const Collider &c) {

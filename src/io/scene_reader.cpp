@@ -211,6 +211,7 @@ void readRod(const YamlValue &value, const Overrides &overrides, SceneFile &out,
   common.initial_turns = map.number("rods[].turns");
   readNatural(map, common);
   common.closed = map.flag("rods[].closed");
+  if (map.has("rods[].layer")) common.layer = readName(map.at("rods[].layer"));
   common.contact = sums.contact;
   readContact(map, common.contact);
   Copies copies;
@@ -304,6 +305,11 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
     for (const YamlValue &v : map.at("colliders").items()) readCollider(v, out.scene);
     if (!out.scene.colliders.empty()) completeContact(map.at("colliders"), out.scene);
   }
+  if (map.has("contact") && out.scene.colliders.empty())
+    map.at("contact").fail(
+        "'contact' has nothing to act on: rods touch 'colliders', but not yet each other; add some, or "
+        "take it away");
+  readIgnored(map, out);
   map.finish();
   out.source.paths = {path};
   keepFiles(map.at("rods"), out.source);

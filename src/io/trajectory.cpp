@@ -1,6 +1,5 @@
 #include "tendril/io/trajectory.hpp"
 
-#include "tendril/contact/contact.hpp"
 #include "tendril/energy/derived.hpp"
 
 #include <algorithm>
@@ -23,7 +22,8 @@ struct Snapshot {
   RodStrains strains;
   RodActions actions;
   std::vector<double> constraint_deviation = {}, constraint_force = {};
-  std::vector<Vec3> contact_force = {}, collider_position = {};
+  std::vector<ContactReading> contacts = {};
+  std::vector<Vec3> contact_force = {}, collider_force = {}, collider_moment = {}, collider_position = {};
   std::vector<Eigen::Vector4d> collider_rotation = {};
 };
 enum class From { state, second_word, strains, actions, contact, motion };
@@ -62,6 +62,11 @@ const Field fields[] = {
     {"constraint_force", "N, N m", On::constraints, 6, From::actions,
      [](const Snapshot &s) { return s.constraint_force.data(); }},
     {"contact_force", "N", On::vertices, 3, From::contact, [](const Snapshot &s) { return s.contact_force[0].data(); }},
+    // On the rods; moments about the positions of the obstacles.
+    {"collider_force", "N", On::colliders, 3, From::contact,
+     [](const Snapshot &s) { return s.collider_force[0].data(); }},
+    {"collider_moment", "N m", On::colliders, 3, From::contact,
+     [](const Snapshot &s) { return s.collider_moment[0].data(); }},
     // Where obstacles stand, and quaternions w, x, y, z from their axes to the world's; where any moves.
     {"collider_position", "m", On::colliders, 3, From::motion,
      [](const Snapshot &s) { return s.collider_position[0].data(); }},
@@ -99,7 +104,11 @@ const std::vector<std::string> &TrajectoryWriter::fieldNames() {
 }
 
 const std::vector<std::string> &TrajectoryWriter::derivedFieldNames() {
-  static const std::vector<std::string> names = namesOf(true);
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> all = namesOf(true);
+    all.push_back("contacts"); // a group of its own
+    return all;
+  }();
   return names;
 }
 
@@ -130,6 +139,7 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
     file_.writeAttribute(std::string("state/") + f.name, "unit", std::string(f.unit));
     file_.writeAttribute(std::string("state/") + f.name, "place", std::string(places[std::size_t(f.place)]));
   }
+  if (wanted.count("contacts") && !scene.colliders.empty()) contacts_ = std::make_unique<ContactWriter>(file_);
   file_.createGroup("summary");
   writeSummary(emptySummary(scene));
   file_.createGroup("diagnostics");
@@ -161,6 +171,8 @@ TrajectoryWriter::~TrajectoryWriter() {
   for (auto *all : {&state_, &diagnostics_})
     for (auto &series : *all) (void)series.release();
   for (auto *series : {&time_, &step_, &critical_}) (void)series->release();
+  if (contacts_) contacts_->abandon();
+  (void)contacts_.release();
   new Hdf5File(std::move(file_));
 }
 
@@ -181,9 +193,14 @@ void TrajectoryWriter::writeFrame(const State &state) {
     snapshot.strains = rodStrains(scene_, elements_, state, state.time, dynamic_ ? 1 : state.time);
   if (wanted(From::actions))
     snapshot.actions = rodActions(scene_, elements_, state, state.time, dynamic_ ? 1 : state.time, dynamic_);
-  if (wanted(From::contact))
-    snapshot.contact_force =
-        contactForces(scene_, elements_, state, configurationOf(state, scene_, elements_, state.time));
+  if (wanted(From::contact) || contacts_)
+    snapshot.contacts =
+        contactReadings(scene_, elements_, state, configurationOf(state, scene_, elements_, state.time));
+  if (wanted(From::contact)) {
+    snapshot.contact_force = contactForces(elements_, snapshot.contacts);
+    colliderActions(scene_, snapshot.contacts, state.time, &snapshot.collider_force, &snapshot.collider_moment);
+  }
+  if (contacts_) contacts_->append(snapshot.contacts);
   for (const Collider &c : wanted(From::motion) ? scene_.colliders : std::vector<Collider>()) {
     const Collider::Pose pose = c.poseAt(state.time);
     const Eigen::Quaterniond q(pose.rotation);
@@ -228,6 +245,7 @@ void TrajectoryWriter::flush() {
   critical_->flush();
   for (const auto &series : state_)
     if (series) series->flush();
+  if (contacts_) contacts_->flush();
   step_->flush();
   time_->flush();
   broken_ = false;
@@ -235,7 +253,7 @@ void TrajectoryWriter::flush() {
 }
 
 void TrajectoryWriter::flushWhenDue() {
-  std::size_t waiting = csv_rows_.size();
+  std::size_t waiting = csv_rows_.size() + (contacts_ ? contacts_->waitingBytes() : 0);
   for (const auto &series : state_)
     if (series) waiting += series->waitingBytes();
   const Clock::time_point now = Clock::now();

@@ -243,6 +243,7 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
     PetscCall(SNESGetConvergedReason(snes_, &reason));
   } while (reason == SNES_DIVERGED_MAX_IT && --limits > 0);
   failure->clear();
+  limit_reached_ = reason == SNES_DIVERGED_MAX_IT;
   if (reason > 0 || creeps_) PetscFunctionReturn(0); // a saddle nearby is left as one that was reached
   report_.lost = !lost_.empty() && (reason == SNES_DIVERGED_LOCAL_MIN || reason == SNES_DIVERGED_LINE_SEARCH);
   if (report_.lost)
@@ -315,23 +316,27 @@ PetscErrorCode NewtonSolver::settle(Seek along, Outcome *now) {
   PetscFunctionReturn(0);
 }
 
-/// What terms take for constant, as friction does its normal forces, is taken anew from the answer until that changes
-/// nothing.
-PetscErrorCode NewtonSolver::renew(std::string *failure) {
+/// Newton; what terms take for constant, as friction does its normal forces, is taken anew from its answer until that
+/// changes nothing. In statics friction may be all that holds a rod: it is taken anew from where Newton's patience
+/// ends, too.
+PetscErrorCode NewtonSolver::newtonAndRenew(std::string *failure) {
   constexpr double little = 1e-3;
   constexpr int most = 20;
   PetscFunctionBeginUser;
-  for (int round = 0; failure->empty(); ++round) {
-    double change = 0;
+  const bool is_static = potential_->step().isStatic();
+  double change = 0;
+  for (int round = 0;; ++round) {
+    PetscCall(newton(failure));
+    const bool settled = failure->empty(), was_little = round > 0 && change < little;
+    if (settled ? was_little : !(is_static && limit_reached_)) PetscFunctionReturn(0);
+    if (round > most) break;
+    change = 0;
     for (int r = rods_.begin; r < rods_.end; ++r) change = std::max(change, potential_->renew(r));
-    if (change == 0) break;
+    if (change == 0) PetscFunctionReturn(0);
     forgetEnergies();
-    if (round == most)
-      *failure = "friction does not settle: its forces still change by " + shortText(change) + " of themselves";
-    else
-      PetscCall(newton(failure));
-    if (change < little) break;
   }
+  if (failure->empty())
+    *failure = "friction does not settle: its forces still change by " + shortText(change) + " of themselves";
   PetscFunctionReturn(0);
 }
 
@@ -345,8 +350,7 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
   });
   Outcome now;
   now.failure = potential_->beyondBarrier();
-  if (now.failure.empty()) PetscCall(newton(&now.failure));
-  if (now.failure.empty()) PetscCall(renew(&now.failure));
+  if (now.failure.empty()) PetscCall(newtonAndRenew(&now.failure));
   if (potential_->step().isStatic()) PetscCall(settleMinimum(seek, &now));
   report_.converged = now.failure.empty();
   for (int r = rods_.begin; r < rods_.end; ++r)

@@ -1,4 +1,5 @@
 /// Indefinite Hessians: descent directions from shifted ones, and the ways out of saddles.
+#include "tendril/contact/contact.hpp"
 #include "tendril/solver/activity.hpp"
 #include "tendril/solver/hints.hpp"
 #include "tendril/solver/newton.hpp"
@@ -335,8 +336,11 @@ PetscErrorCode NewtonSolver::settleMinimum(Seek seek, Outcome *now) {
       now->failure = "the equilibrium is unstable" + now->beyond;
       break;
     }
-    for (int r = rods_.begin; r < rods_.end && negative > 0 && circulatory_; ++r) // couples: no minimum to speak of
-      if (circulatory_->acts(r)) negative -= std::exchange(work_->negative[r], 0);
+    const Scene &scene = potential_->scene();
+    // Couples have no minimum to speak of. What friction at the surface holds may roll, and does so from rounding.
+    for (int r = rods_.begin; r < rods_.end && negative > 0; ++r)
+      if ((circulatory_ && circulatory_->acts(r)) || (scene.touches(r) && carriesSurface(scene.rods[r])))
+        negative -= std::exchange(work_->negative[r], 0);
     if (negative == 0) {
       PetscCall(settle(seek_, now));
       continue;

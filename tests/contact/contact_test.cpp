@@ -211,7 +211,8 @@ TEST(Contact, LoweredOntoAPlaneBearsTheMomentOfItsHeight) {
       // What is left of the vertical balance is at the clamp.
       double contact = 0;
       for (const Vec3 &f :
-           contactForces(sim.scene, *sim.elements, sim.state, configurationOf(sim.state, sim.scene, *sim.elements, 1)))
+           contactForces(*sim.elements, contactReadings(sim.scene, *sim.elements, sim.state,
+                                                        configurationOf(sim.state, sim.scene, *sim.elements, 1))))
         contact += f[2];
       EXPECT_NEAR(contact + actions.reaction[0][2], length, 1e-5 * length);
     }
@@ -372,6 +373,21 @@ TEST(Contact, ObstaclesThatTurnWithinAStepDoNotPass) {
         sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
     if (!finished) continue; // it said so
     EXPECT_GT((sim.state.position[10] - rod.position[10]).norm(), 0.01) << turns;
+  }
+}
+
+TEST(Contact, ObstaclesThatARodPassesAreNotThere) {
+  Scene scene;
+  scene.gravity = Vec3(0, 0, -10);
+  scene.rods = {rubber(10, 0.02), rubber(10, 0.02)};
+  scene.colliders = {floorAt(-0.05), floorAt(0)};
+  scene.rods[1].contact.passes = {1};
+  scene.rods[1].name = "other";
+  Simulation sim;
+  runTo(sim, scene, dynamics(0.01, 1));
+  for (int i = 0; i <= 10; ++i) {
+    EXPECT_NEAR(sim.state.position[i][2], 0.005, 0.0005);
+    EXPECT_NEAR(sim.state.position[11 + i][2], -0.045, 0.0005);
   }
 }
 

@@ -144,9 +144,62 @@ TEST(Friction, AtTheSurfaceARodRolls) {
   for (const Vec3 &v : sliding.state.velocity) EXPECT_LT(v[1], 0.01); // at the centreline it sticks
 }
 
-/// A cord without bending stiffness over a drum: tensions at both ends are as exp(coefficient x angle) when it slides.
-TEST(Friction, AtTheCentrelineARopeHoldsAsEulerSays) {
+/// What sticks by an anchor comes to rest; in steps in load, it lies the same however many these are.
+TEST(Friction, AnchoredARodStays) {
+  const double angle = 24 * pi / 180; // of 26.6
+  for (const bool at_surface : {false, true}) {
+    Scene scene = onIncline(0.5, angle, Vec3::UnitX(), at_surface);
+    scene.rods[0].contact.stick = ContactSettings::Stick::anchored;
+    Simulation early, late;
+    runTo(early, scene, dynamics(0.02, 1));
+    runTo(late, scene, dynamics(0.02, 3));
+    for (std::size_t i = 0; i < late.state.position.size(); ++i)
+      EXPECT_NEAR(late.state.position[i][0], early.state.position[i][0], 1e-9); // 17 mm of creeping, else
+  }
+  std::vector<double> at;
+  for (const int load_steps : {1, 4, 16}) {
+    Simulation sim;
+    runTo(sim, onIncline(0.5, angle, Vec3::UnitX(), false), statics(load_steps));
+    at.push_back(sim.state.position[0][0]);
+  }
+  EXPECT_NEAR(at[1], at[0], 1e-8);
+  EXPECT_NEAR(at[2], at[0], 1e-8);
+  EXPECT_LT(at[0], 1e-3 * radius); // the slip length
+}
+
+/// The readings of a rod that lies still add up to its weight, and as many newtons hold it back.
+TEST(Friction, ReadingsAddUpToTheWeight) {
+  const double angle = 20 * pi / 180;
+  for (const bool at_surface : {false, true}) {
+    Scene scene = onIncline(0.5, angle, Vec3::UnitX(), at_surface);
+    scene.rods[0].contact.stick = ContactSettings::Stick::anchored;
+    Simulation sim;
+    runTo(sim, scene, dynamics(0.02, 3));
+    const auto readings = contactReadings(scene, *sim.elements, sim.state,
+                                          configurationOf(sim.state, scene, *sim.elements, sim.state.time));
+    std::vector<Vec3> force, moment;
+    colliderActions(scene, readings, sim.state.time, &force, &moment);
+    const double weight = scene.rods[0].material.linear_density * 0.3 * g;
+    EXPECT_NEAR(force[0][0], -weight * std::sin(angle), 1e-5 * weight);
+    EXPECT_NEAR(force[0][2], weight * std::cos(angle), 1e-5 * weight);
+    // About the origin, the weight at its centre of mass is balanced.
+    const Vec3 centre(sim.state.position[3][0], 0, sim.state.position[3][2]);
+    const Vec3 of_weight = centre.cross(scene.gravity * weight / g);
+    EXPECT_LT((moment[0] + of_weight).norm(), 2e-5 * weight * 0.3) << at_surface;
+    const std::vector<Vec3> shared = contactForces(*sim.elements, readings);
+    Vec3 sum = Vec3::Zero();
+    for (const Vec3 &f : shared) sum += f;
+    EXPECT_LT((sum - force[0]).norm(), 1e-12 * weight);
+  }
+}
+
+/// A cord over a drum: tensions at both ends are as exp(coefficient x angle) when it slides. Friction at the surface
+/// has the rod's radius r for a lever, which leaves 1 - r/rho of it: T' = coefficient p (1 - r/rho) of balance of
+/// moments.
+class Capstan : public ::testing::TestWithParam<bool> {};
+TEST_P(Capstan, ARopeHoldsAsEulerSays) {
   constexpr double drum = 0.1;
+  const bool at_surface = GetParam();
   const double rho = drum + radius, coefficient = 0.3;
   constexpr int edges = 120;
   Rod rod;
@@ -159,11 +212,12 @@ TEST(Friction, AtTheCentrelineARopeHoldsAsEulerSays) {
                            Vec3(0, 0, s < 0 ? beyond : -beyond));
   }
   rod.material = {0.1, 1e-6, 1e5, 0, {0, 0}, 0, 0};
+  if (at_surface) rod.material = {0.1, 1e-6, 1e5, 1e-6, {1e-6, 1e-6}, 0, 0}; // 1e-5 of the tension times rho^2
   rod.gravity = false;
   rod.contact.radius = radius;
   rod.contact.distance = 0.2 * radius;
   rod.contact.friction = coefficient;
-  rod.contact.friction_at_surface = false;
+  rod.contact.friction_at_surface = at_surface;
   rod.contact.slip_length = 1e-6;
   setBishopDirectors(rod);
   Scene scene;
@@ -177,8 +231,11 @@ TEST(Friction, AtTheCentrelineARopeHoldsAsEulerSays) {
   Simulation sim;
   runTo(sim, scene, statics(10));
   const double ratio = sim.state.axial_force[edges - 1] / sim.state.axial_force[0];
-  EXPECT_NEAR(ratio, std::exp(coefficient * pi), 0.005 * ratio); // lag 1e-3, and edges of 5 mm
+  const double lever = at_surface ? 1 - radius / rho : 1;
+  EXPECT_NEAR(ratio, std::exp(coefficient * pi * lever), 0.005 * ratio); // lag 1e-3, and edges of 5 mm
 }
+INSTANTIATE_TEST_SUITE_P(Friction, Capstan, ::testing::Bool(),
+                         [](const auto &at) { return at.param ? "AtTheSurface" : "AtTheCentreline"; });
 
 } // namespace
 } // namespace tendril::test

@@ -31,6 +31,13 @@ public:
     if (values.empty()) values.resize(4 * strainRow(elements_));
     for (double &v : values) (*this)(v);
   }
+  void operator()(std::vector<std::vector<ContactMemory>> &all) {
+    all.resize(elements_.rods.size());
+    for (auto &of_rod : all) {
+      of_rod.resize(std::size_t(2 + count_ % 3));
+      for (ContactMemory &m : of_rod) m = {++count_, ++count_, ++count_, Vec3(1, ++count_, 2), Vec3(++count_, 3, 4)};
+    }
+  }
   void operator()(std::vector<Rates> &all) {
     all.resize(2);
     for (Rates &rates : all) {

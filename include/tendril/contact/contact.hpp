@@ -6,19 +6,37 @@
 
 namespace tendril {
 
+/// Whether friction acts at the surface of a rod, whose frames it turns; cables have none.
+bool carriesSurface(const Rod &rod);
+
 /// A sample in contact, in the axes of the world.
 struct ContactPoint {
   double at;      ///< part of its edge
-  Vec3 normal;    ///< out of the obstacle
+  Vec3 normal;    ///< gradient of the distance: out of the obstacle, of length 1 but where it is interpolated
   Vec3 force;     ///< on the rod [N]
   Mat3 stiffness; ///< second derivatives of the energy by its place: by the law, ... [N/m]
   Mat3 curvature; ///< ... and by the turning of the normal
 };
 ContactPoint contactPoint(const Scene &scene, const RodContacts &rod, const Samples &samples, int k);
 
-/// (nv) What obstacles do to the rods at a state [N]. \param c of the state
-std::vector<Vec3> contactForces(const Scene &scene, const Elements &elements, const State &state,
-                                const Configuration &c);
+/// A sample in contact at a state.
+struct ContactReading {
+  int rod, collider, edge;
+  double at;     ///< part of the edge
+  double gap;    ///< between surfaces [m]
+  Vec3 place;    ///< of the sample, on the axis of the rod [m]
+  Vec3 normal;   ///< out of the obstacle
+  Vec3 force;    ///< of the normal law, on the rod [N]
+  Vec3 friction; ///< and what else the obstacle does, friction and damping, in the step that led to the state [N]
+};
+/// \param c of the state
+std::vector<ContactReading> contactReadings(const Scene &scene, const Elements &elements, const State &state,
+                                            const Configuration &c);
+/// (nv) Their forces, shared by the vertices of each edge [N].
+std::vector<Vec3> contactForces(const Elements &elements, const std::vector<ContactReading> &readings);
+/// What each obstacle does to the rods: force [N], and moment about its position [N m]. \param time of the state [s]
+void colliderActions(const Scene &scene, const std::vector<ContactReading> &readings, double time,
+                     std::vector<Vec3> *force, std::vector<Vec3> *moment);
 
 /// Where a rod comes nearest to an obstacle.
 struct Touch {

@@ -19,6 +19,8 @@ struct SlidingPoint {
   Vec3 normal = Vec3::Zero();  ///< out of the obstacle, in the axes of the world
   Vec3 arm = Vec3::Zero();     ///< from the axis of the rod, along tangent and both directors of the edge [m]
   Vec3 touched = Vec3::Zero(); ///< point of the obstacle, in its axes [m]
+  Vec3 stick = Vec3::Zero();   ///< drawn from its anchor when the step began, in the axes of the world [m]
+  Vec3 held = Vec3::Zero();    ///< friction on the rod when the step began, in the axes of the world [N]
   Vec3 start = Vec3::Zero();   ///< from that point to the rod's when the step began, in the axes of the world [m]
 };
 
@@ -26,6 +28,7 @@ struct SlidingPoint {
 struct Sliding {
   double fall_off; ///< way below which friction falls off to zero [m]
   double time;     ///< that the step has taken; 0 in statics [s]
+  bool holds = false; ///< whether nothing slides
 };
 
 /// Derivatives by the place of the point.
@@ -34,8 +37,10 @@ struct SlidingForce {
   Vec3 gradient = Vec3::Zero();
   Mat3 hessian = Mat3::Zero();
 };
-/// Of a way u: normal force times coefficient times rho(|u across the normal|), which is u^2/a - u^3/(3 a^2) up to the
-/// fall-off a and u - a/3 beyond; and with dampings of the contact, that force times damping/2 u^2 over the time.
+/// Of a way u: normal force times coefficient times rho(|u across the normal, from the anchor|), with rho(u) =
+/// u^2/a - u^3/(3 a^2) up to the fall-off a and u - a/3 beyond; and with dampings of the contact, that force times
+/// damping/2 u^2 over the time. Where nothing slides, what held before and a spring take the place of friction, which
+/// reaches `pressing` at the fall-off.
 SlidingForce slidingForce(const SlidingPoint &point, const ContactSettings &settings, const Sliding &sliding,
                           const Vec3 &way);
 

@@ -77,6 +77,7 @@ private:
   const RodRange &rod_;
   const int index_;
   NormalLaw law_;
+  std::vector<int> met_;                         ///< colliders that are there for the rod
   std::vector<std::vector<SamplePoint>> points_; ///< per collider
   std::vector<double> away_;          ///< per chunk and collider: no sample reaches an obstacle that moves less [m]
   std::vector<double> nearest_;       ///< per chunk: the least of these
@@ -98,7 +99,7 @@ void RodContacts::visitNear(const Configuration &c, const Configuration *also, V
     const double moved = std::max(movedSince(c, chunk), also ? movedSince(*also, chunk) : 0);
     if (all_stood && moved < nearest_[chunk]) continue;
     const int edges = edgesOf(chunk);
-    for (int k = 0; k < colliders; ++k) {
+    for (const int k : met_) {
       const bool still = all_stood || !scene_.colliders[k].motion.moves();
       if (still && moved < away_[chunk * colliders + k]) continue;
       for (int first = 0; first < edges * int(points_[k].size()); first += Samples::most) {

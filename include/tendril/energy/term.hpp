@@ -95,7 +95,7 @@ public:
   /// Takes what it took from before for constant anew from the iterate. \return by which part that changes its forces
   virtual double renew(const Configuration & /*iterate*/, int /*rod*/) { return 0; }
   /// What a state remembers of it beside the configuration, after the step.
-  virtual void commit(State & /*state*/, int /*rod*/) const {}
+  virtual void commit(State & /*state*/, const Configuration & /*configuration*/, int /*rod*/) const {}
   /// How far rounding blurs the energy, beyond that of its value and of strains [J]. \param blur of an edge over its
   /// length
   virtual double noise(const Configuration & /*configuration*/, int /*rod*/, double /*blur*/) const { return 0; }

@@ -2,6 +2,7 @@
 /// \file collider_reader.hpp
 /// Obstacles, and how rods touch them. \throws SceneError
 
+#include "tendril/io/scene_reader.hpp"
 #include "tendril/io/yaml.hpp"
 
 namespace tendril {
@@ -11,6 +12,8 @@ ContactSettings readContact(YamlMap &scene);
 /// What the block of a rod says.
 void readContact(YamlMap &rod, ContactSettings &settings);
 void readCollider(const YamlValue &value, Scene &scene);
+/// Which rods pass which colliders, when both are there.
+void readIgnored(YamlMap &scene, SceneFile &out);
 /// What no key says. \param colliders for messages
 void completeContact(const YamlValue &colliders, Scene &scene);
 

@@ -26,10 +26,13 @@ namespace tendril {
   {block ".friction_at", KeyType::word, "", "surface",                                                                 \
    "where friction acts: at the surface, where it turns the rod, or at its centreline", anything,                      \
    "surface|centreline", "centreline"},                                                                                \
+  {block ".stick", KeyType::word, "", "(anchored in statics, else creep)",                                             \
+   "what does not slide slips a little in every step, or is drawn back to where it began to stick", anything,          \
+   "creep|anchored", "anchored"},                                                                                      \
   {block ".fall_off_velocity", KeyType::number, "m/s", "0.01",                                                         \
    "below which friction falls off to zero: what counts as sticking", positive, "", "1e-3"},                           \
   {block ".slip_length", KeyType::number, "m", "(a thousandth of the radius)",                                         \
-   "the same in statics, of the way since the last load step", positive, "", "1e-5"},                                  \
+   "the same of a way: in statics, and from the anchor of what sticks", positive, "", "1e-5"},                         \
   {block ".tangential_damping", KeyType::number, "s/m", "0",                                                           \
    "viscous friction: of the normal force, by the velocity along the surface", not_negative, "", "0.1"},               \
   {block ".normal_damping", KeyType::number, "s/m", "0",                                                               \
@@ -56,6 +59,8 @@ inline constexpr Key scene_keys[] = {
     {"rods[].name", KeyType::text, "", "(rod0, rod1, ...)",
      "by which supports and loads find it; stands for all rods of its block, name.1 and name#2 for one", anything, "",
      "spring"},
+    {"rods[].layer", KeyType::text, "", "(none)", "by which 'contact.ignore' finds it, with others", anything, "",
+     "strands"},
     {"rods[].line", KeyType::map, "", "(another shape)", "a straight rod"},
     {"rods[].line.from", KeyType::vector, "m", "required", "first vertex", anything, "", "[0, 0, 0]"},
     {"rods[].line.to", KeyType::vector, "m", "required", "last vertex", anything, "", "[1, 0, 0]"},
@@ -218,6 +223,8 @@ inline constexpr Key scene_keys[] = {
     {"colliders", KeyType::list, "", "(none)", "obstacles that rods touch"},
     {"colliders[].name", KeyType::text, "", "(collider0, collider1, ...)", "for files and messages", anything, "",
      "floor"},
+    {"colliders[].layer", KeyType::text, "", "(none)", "by which 'contact.ignore' finds it, with others", anything, "",
+     "ground"},
     {"colliders[].plane", KeyType::map, "", "(another shape)", "a plane; all behind it is solid"},
     {"colliders[].plane.normal", KeyType::vector, "", "[0, 1, 0]", "out of the solid, of any length", anything, "",
      "[0, 0, 1]"},
@@ -261,6 +268,11 @@ inline constexpr Key scene_keys[] = {
      "[[0, 0, 0, 0], [1, 0.1, 0, 0]]"},
     {"contact", KeyType::map, "", "(defaults)", "how all rods touch obstacles; each rod may have keys of its own"},
     TENDRIL_CONTACT_KEYS("contact"),
+    {"contact.ignore", KeyType::list, "", "(none)", "rods that pass through colliders as if they were not there"},
+    {"contact.ignore[].rods", KeyType::text, "", "required", "name or layer of the rods, or all", anything, "",
+     "strands"},
+    {"contact.ignore[].colliders", KeyType::text, "", "required", "name or layer of the colliders", anything, "",
+     "floor"},
 };
 
 } // namespace tendril

@@ -4,7 +4,7 @@
 /// ParaView reads it.
 
 #include "tendril/dynamics/diagnostics.hpp"
-#include "tendril/io/hdf5.hpp"
+#include "tendril/io/contact_writer.hpp"
 #include "tendril/io/scene_reader.hpp"
 #include "tendril/io/summary.hpp"
 
@@ -69,6 +69,7 @@ private:
   std::vector<std::unique_ptr<Hdf5Series>> state_; ///< of all fields in their order; null where one is not written
   std::unique_ptr<Hdf5Series> time_, step_, critical_;
   std::vector<std::unique_ptr<Hdf5Series>> diagnostics_;
+  std::unique_ptr<ContactWriter> contacts_; ///< or null
   bool broken_ = false, finished_ = false; ///< a flush failed, after which HDF5 must not touch the file; all is written
   Clock::time_point flushed_, described_at_; ///< long ago: the first frame goes to the files at once
   std::size_t described_ = 0;                ///< frames in the XDMF file

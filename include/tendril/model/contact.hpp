@@ -7,6 +7,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace tendril {
 
@@ -29,7 +30,12 @@ struct ContactSettings {
   double slip_length = 0;          ///< in statics the same of the way since the last load step [m]
   bool friction_at_surface = true; ///< or at the axis, where it turns nothing
   double tangential_damping = 0, normal_damping = 0; ///< of the normal force by the velocity [s/m]
-  int quadrature = 0; ///< Gauss points of an edge; 0: vertices, and points between where obstacles curve
+  /// What friction does with points that stick: `creep`, they slip a little in every step; `anchored`, they are drawn
+  /// by a spring from where they began to stick. `by_mode`: anchored in statics.
+  enum class Stick { by_mode, creep, anchored };
+  Stick stick = Stick::by_mode;
+  std::vector<int> passes; ///< obstacles that are not there for it
+  int quadrature = 0;      ///< Gauss points of an edge; 0: vertices, and points between where obstacles curve
 
   bool isBarrier() const { return law == Law::barrier; }
   /// Distance between surfaces that no motion passes [m].
@@ -37,12 +43,13 @@ struct ContactSettings {
     return isBarrier() ? -0.5 * distance : radius > 0 ? -0.8 * radius : -std::numeric_limits<double>::infinity();
   }
   bool slides() const { return friction > 0 || tangential_damping > 0 || normal_damping > 0; }
+  bool isAnchored(bool is_static) const { return stick == Stick::anchored || (is_static && stick != Stick::creep); }
   bool operator==(const ContactSettings &) const = default;
 };
 
 /// An obstacle: a solid that stands or moves as it is told.
 struct Collider {
-  std::string name;
+  std::string name, layer;
   std::string kind;                   ///< of its shape, as scenes have it
   Vec3 size = Vec3::Zero();           ///< of its shape: radius and length; bore, outer radius and length; edges [m]
   std::shared_ptr<const Shape> shape; ///< about its own origin

@@ -23,7 +23,7 @@ std::string shortText(double value);
 /// Rod as drawn: the reference configuration. Vertex i and i+1 bound edge i; a closed rod has as many edges as
 /// vertices.
 struct Rod {
-  std::string name;
+  std::string name, layer;
   bool closed = false;
   std::vector<Vec3> position; ///< reference positions (nv) [m]
   std::vector<Vec3> director; ///< first directors (ne), unit, normal to their edges
@@ -134,6 +134,11 @@ struct Scene {
   double collidersEvenUntil(double from, double to) const;
   /// Whether a rod may touch anything.
   bool touches(int rod) const { return !colliders.empty() && rods[rod].contact.on; }
+  /// Whether friction or damping acts on any.
+  bool slides() const {
+    return std::any_of(rods.begin(), rods.end(),
+                       [this](const Rod &r) { return !colliders.empty() && r.contact.on && r.contact.slides(); });
+  }
 };
 
 /// Fills the directors of a rod with discrete Bishop frames: `start` (or some normal of the first edge when zero)

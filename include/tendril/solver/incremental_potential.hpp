@@ -171,7 +171,7 @@ public:
   void commitConfiguration(State &state, RodSet rods) const {
     tendril::commitConfiguration(elements_, iterate_, rods, state);
     for (const auto &term : terms_)
-      for (int r = rods.begin; r < rods.end; ++r) term->commit(state, r);
+      for (int r = rods.begin; r < rods.end; ++r) term->commit(state, iterate_, r);
   }
   /// Of all, with the time; in steps in time the velocities are those of the stage.
   void commit(State &state) const;

@@ -155,10 +155,11 @@ private:
   std::vector<double> lengths_;     ///< of the last step, per rod
   int age_ = 0;                     ///< iterations that the factorisation has served
   bool fresh_ = true, renew_ = false;
-  double likely_ = 0;     ///< residual from which the next iterate is likely an answer
-  std::string lost_;      ///< why the last solve was lost in rounding
-  bool creeps_ = false;   ///< whether the last solve ended for creeping towards a saddle
-  bool descends_ = false; ///< whether creeping goes on, for what ends it
+  double likely_ = 0;          ///< residual from which the next iterate is likely an answer
+  std::string lost_;           ///< why the last solve was lost in rounding
+  bool limit_reached_ = false; ///< whether the last solve ended for -snes_max_it
+  bool creeps_ = false;        ///< whether the last solve ended for creeping towards a saddle
+  bool descends_ = false;      ///< whether creeping goes on, for what ends it
 
   /// What a solve has come to.
   struct Outcome {
@@ -172,7 +173,7 @@ private:
   PetscErrorCode settleNeutral(bool first, bool creeps, Seek seek, Outcome *now);
   PetscErrorCode settleMinimum(Seek seek, Outcome *now);
   PetscErrorCode newton(std::string *failure);
-  PetscErrorCode renew(std::string *failure);
+  PetscErrorCode newtonAndRenew(std::string *failure);
   PetscErrorCode moveTo(Vec x, bool *possible);
   PetscErrorCode writeIterate(Vec x);
   KSP factored() const;

@@ -5,6 +5,7 @@
 #include "tendril/layout/elements.hpp"
 
 #include <cstdint>
+#include <tuple>
 
 namespace tendril {
 
@@ -13,6 +14,15 @@ struct Rates {
   std::vector<Vec3> vertex; ///< (nv)
   std::vector<double> edge; ///< (ne) of the twist
   bool operator==(const Rates &) const = default;
+};
+
+/// What a sample in contact remembers of its friction.
+struct ContactMemory {
+  int edge, point, collider; ///< of its rod; of samplePoints; of the scene
+  Vec3 stick;                ///< what sticks has been drawn so far from its anchor, in the axes of the obstacle [m]
+  Vec3 friction;             ///< on the rod, with the damping of the contact [N]
+  bool operator==(const ContactMemory &) const = default;
+  auto key() const { return std::tuple(edge, collider, point); }
 };
 
 /// All that a checkpoint needs. Copied to be restored when a step fails.
@@ -33,11 +43,14 @@ struct State {
   std::vector<Rates> memory; ///< what the integrator remembers of steps before
   std::vector<double>
       strains; ///< before the last step, as strainsOf, then before the one before; where the integrator wants them
-  /// What supports, constraints and obstacles that move did at the end of the last step, then of the one before (HolderActions);
-  /// where the integrator wants them.
+  /// What supports, constraints and obstacles that move did at the end of the last step, then of the one before
+  /// (HolderActions); where the integrator wants them.
   std::vector<Vec3> support_actions;
   /// Stiffness of the barrier between each rod and obstacles in the last step; where there are obstacles [N/m].
   std::vector<double> contact_stiffness;
+  /// What samples of each rod that touched an obstacle at the end of the last step remember, in order; where friction
+  /// acts on any rod.
+  std::vector<std::vector<ContactMemory>> contacts;
 
   bool operator==(const State &) const = default;
 };

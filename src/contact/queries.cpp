@@ -1,0 +1,100 @@
+/// What obstacles do to rods, for output and messages.
+#include "tendril/contact/contact.hpp"
+
+#include <algorithm>
+
+namespace tendril {
+
+bool carriesSurface(const Rod &rod) {
+  return rod.contact.on && rod.contact.slides() && rod.contact.friction_at_surface && !rod.material.isCable();
+}
+
+ContactPoint contactPoint(const Scene &scene, const RodContacts &rod, const Samples &samples, int k) {
+  const Distance d = scene.colliders[samples.collider].shape->at(samples.at(k));
+  const GapLaw law = rod.law()(samples.distance[k]);
+  const double weight = rod.weight(samples, k);
+  const Mat3 &q = samples.pose.rotation;
+  ContactPoint point;
+  point.at = rod.points(samples.collider)[samples.point[k]].at;
+  point.normal = q * d.gradient;
+  point.force = -weight * law.slope * point.normal;
+  point.stiffness = weight * law.curvature * point.normal * point.normal.transpose();
+  point.curvature = weight * law.slope * (q * d.hessian * q.transpose());
+  return point;
+}
+
+std::vector<ContactReading> contactReadings(const Scene &scene, const Elements &elements, const State &state,
+                                            const Configuration &c) {
+  std::vector<ContactReading> readings;
+  for (int r = 0; r < int(scene.rods.size()); ++r) {
+    if (!scene.touches(r)) continue;
+    RodContacts rod(scene, elements, r);
+    if (!state.contact_stiffness.empty()) rod.setStiffness(state.contact_stiffness[r]);
+    rod.look(c, true);
+    const std::vector<ContactMemory> *memory = state.contacts.empty() ? nullptr : &state.contacts[r];
+    rod.visitTouching(c, rod.law(), [&](const Samples &samples, int k) {
+      const ContactPoint point = contactPoint(scene, rod, samples, k);
+      const int slot = samples.slot[k], edge = slot - elements.rods[r].first_slot;
+      const Vec3 from = c.positionAt(slot), place = from + point.at * (c.positionAt(slot + 1) - from);
+      ContactReading reading{r,     samples.collider, edge,        point.at,    samples.distance[k],
+                             place, point.normal,     point.force, Vec3::Zero()};
+      const auto key = std::tuple(edge, samples.collider, samples.point[k]);
+      if (memory) {
+        const auto found = std::lower_bound(memory->begin(), memory->end(), key,
+                                            [](const ContactMemory &m, const auto &x) { return m.key() < x; });
+        if (found != memory->end() && found->key() == key) reading.friction = found->friction;
+      }
+      readings.push_back(reading);
+    });
+  }
+  return readings;
+}
+
+std::vector<Vec3> contactForces(const Elements &elements, const std::vector<ContactReading> &readings) {
+  std::vector<Vec3> force(elements.vertices(), Vec3::Zero());
+  for (const ContactReading &reading : readings) {
+    const RodRange &rod = elements.rods[reading.rod];
+    const Vec3 both = reading.force + reading.friction;
+    force[rod.first_vertex + reading.edge] += (1 - reading.at) * both;
+    force[rod.first_vertex + (reading.edge + 1) % rod.vertices] += reading.at * both;
+  }
+  return force;
+}
+
+void colliderActions(const Scene &scene, const std::vector<ContactReading> &readings, double time,
+                     std::vector<Vec3> *force, std::vector<Vec3> *moment) {
+  force->assign(scene.colliders.size(), Vec3::Zero());
+  moment->assign(scene.colliders.size(), Vec3::Zero());
+  for (const ContactReading &c : readings) {
+    const Rod &rod = scene.rods[c.rod];
+    const Vec3 from = c.place - scene.colliders[c.collider].poseAt(time).position,
+               at = carriesSurface(rod) ? Vec3(from - rod.contact.radius * c.normal) : from;
+    (*force)[c.collider] += c.force + c.friction;
+    (*moment)[c.collider] += from.cross(c.force) + at.cross(c.friction);
+  }
+}
+
+std::vector<Touch> tightest(const Scene &scene, const Elements &elements, const Configuration &c) {
+  std::vector<Touch> found;
+  for (int r = 0; r < int(scene.rods.size()); ++r) {
+    if (!scene.touches(r)) continue;
+    RodContacts rod(scene, elements, r);
+    rod.look(c, true);
+    std::vector<Touch> of_rod(scene.colliders.size());
+    rod.visitNear(c, nullptr, [&](const Samples &samples) {
+      for (int k = 0; k < samples.count; ++k) {
+        Touch &worst = of_rod[samples.collider];
+        if (samples.distance[k] >= worst.gap) continue;
+        const double at = rod.points(samples.collider)[samples.point[k]].at;
+        double arc = 0;
+        for (int s = elements.rods[r].first_slot; s < samples.slot[k]; ++s) arc += elements.restLength()[s];
+        worst = {r, samples.collider, samples.distance[k], arc + at * elements.restLength()[samples.slot[k]]};
+      }
+    });
+    std::copy_if(of_rod.begin(), of_rod.end(), std::back_inserter(found), [](const Touch &t) { return t.rod >= 0; });
+  }
+  std::stable_sort(found.begin(), found.end(), [](const Touch &a, const Touch &b) { return a.gap < b.gap; });
+  return found;
+}
+
+} // namespace tendril
