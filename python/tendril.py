@@ -22,7 +22,7 @@ FORMATS = (1, 2)
 PLACES = ("vertices", "edges", "cells")
 ROWS = ("supports", "constraints", "colliders")  # of fields that are not of rods
 ON_DEMAND = ("curvature", "twist", "strain_energy_density", "force", "moment", "reaction", "reaction_moment",
-             "constraint_deviation", "constraint_force", "contact_force", "position_low")
+             "constraint_deviation", "constraint_force", "contact_force", "collider_force", "collider_moment", "position_low")
 
 # Place and unit of what is in files of format 1; later ones tell by themselves.
 FORMAT_1_FIELDS = {
@@ -484,6 +484,16 @@ class Trajectory:
             hint = f"; runs with -output_fields all,{name} have it" if name in ON_DEMAND else ""
             raise TendrilError(f"there is no field '{name}'; there are: {_listed(self._fields)}{hint}")
         return Field(self, name)
+
+    def contacts(self, frame=-1):
+        """Samples in contact in a frame: arrays of one row each by name, `rod`, `collider`, `edge`, `at` (part of the
+        edge), `gap` [m], `position` (n, 3) [m], `normal` (n, 3), `normal_force` and `friction` (n, 3) on the rod [N]."""
+        if "contacts" not in self._file:
+            raise TendrilError("there are no contacts; runs with colliders and -output_fields all,contacts have them")
+        k = self._frame(frame)
+        end = self._dataset("contacts/end")
+        rows = slice(int(end[k - 1]) if k else 0, int(end[k]))
+        return {name: self._dataset("contacts/" + name)[rows] for name in self._file["contacts"] if name != "end"}
 
     def at(self, time):
         """The Moment at a time [s] within the run."""

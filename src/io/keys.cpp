@@ -112,6 +112,7 @@ std::string boundsText(const Key &key) {
 
 /// What keys of one block ask of each other. The reader says the same, in words.
 std::string rulesOf(std::string_view block) {
+  if (block.empty()) return R"("dependencies": {"contact": ["colliders"]})";
   if (block == "rods[]")
     return R"("oneOf": [{"required": ["line"]}, {"required": ["ring"]}, {"required": ["helix"]}, {"required": ["points"]}, {"required": ["file"]}])";
   if (block == "rods[].material")

@@ -89,6 +89,9 @@ def exampleScene(path, value):
             put(scene, "rods[].contact", "none")
         elif path != "rods[].contact":
             put(scene, "contact.radius" if path.startswith("contact") else "rods[].contact.radius", 0.01)
+        if path.startswith("contact.ignore"):
+            put(scene, "rods[].layer", "strands")
+            put(scene, "colliders[].name", "floor")
         if name in ("threshold", "smoothing"):
             put(scene, path.rpartition(".")[0] + ".law", "penalty")
     if path.startswith("supports[].motion"):

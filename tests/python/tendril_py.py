@@ -256,6 +256,42 @@ def bodies_and_colliders(folder):
     assert "body_position" not in t.field_names and len(t.at(0.1).colliders) == 1
 
 
+def contacts_of_a_rod_at_rest(folder):
+    """Rows frame by frame, which add up to what the fields of vertices and of colliders say; and the weight."""
+    with open(folder + "/rest.yaml", "w") as f:
+        f.write("""gravity: [0, 0, -10]
+simulation: {dt: 0.02, t_end: 2}
+rods:
+  - {name: above, line: {from: [0, 0, 0.02], to: [0.3, 0, 0.02], edges: 6}, layer: high,
+     material: {radius: 0.005, young: 1e7, poisson: 0.4, density: 1000}}
+  - {name: below, line: {from: [0, 1, 0.0052], to: [0.3, 1, 0.0052], edges: 3},
+     material: {radius: 0.005, young: 1e7, poisson: 0.4, density: 1000}}
+contact: {friction: 0.3, ignore: [{rods: below, colliders: shelf}]}
+colliders:
+  - {name: shelf, box: {size: [1, 4, 0.004]}, position: [0, 0, 0.012]}
+  - {name: floor, plane: {normal: [0, 0, 1]}}
+""")
+    subprocess.run([program, "-scene", folder + "/rest.yaml", "-output_dir", folder + "/rest", "-output_fields",
+                    "all,contacts,contact_force,collider_force,collider_moment"], check=True, stdout=subprocess.DEVNULL)
+    t = Trajectory(folder + "/rest")
+    rows = [t.contacts(k) for k in range(len(t.time))]
+    assert sum(len(r["gap"]) for r in rows) == len(t._dataset("contacts/gap")) and len(rows[0]["gap"]) < len(rows[-1]["gap"])
+    last = rows[-1]
+    assert set(last["rod"]) == {0, 1} and np.array_equal(last["rod"], last["collider"]) and (np.diff(last["rod"]) >= 0).all()
+    weight = np.pi * 0.005**2 * 1000 * 0.3 * 10
+    force = last["normal_force"] + last["friction"]
+    for k in (0, 1):
+        of_collider = force[last["collider"] == k]
+        assert np.allclose(of_collider.sum(0), [0, 0, weight], atol=1e-4 * weight), of_collider.sum(0)
+        assert np.allclose(of_collider.sum(0), t.field("collider_force")[-1, k], rtol=0, atol=1e-12)
+    arms = last["position"] - np.array([[0, 0, 0.012], [0, 0, 0]])[last["collider"]]
+    assert np.allclose(np.cross(arms, last["normal_force"])[last["rod"] == 0].sum(0), t.field("collider_moment")[-1, 0], atol=1e-5)
+    assert np.allclose(force.sum(0), t.field("contact_force")[-1].sum(0), rtol=0, atol=1e-12)
+    assert np.abs(last["gap"]).max() < 0.0005 and np.allclose(last["normal"], [0, 0, 1])
+    message(lambda: t.contacts(10**6), "no frame")
+    message(lambda: Trajectory(folder + "/out").contacts(), "-output_fields all,contacts")
+
+
 def wrong_input(folder):
     good, path = folder + "/out/trajectory.h5", folder + "/wrong.h5"
     t = Trajectory(good)
@@ -300,6 +336,7 @@ with tempfile.TemporaryDirectory() as main, tempfile.TemporaryDirectory() as oth
     rods_and_origin(main)
     between_frames(main)
     bodies_and_colliders(main)
+    contacts_of_a_rod_at_rest(main)
     wrong_input(main)
     directors_turn_between_frames(other)
     shutil.rmtree(other + "/out")
