@@ -277,6 +277,35 @@ def orders(tmp):
     print("rods in another order are refused")
 
 
+def touching(tmp):
+    """A rod that sticks and slips behind a spring over a floor, and one that a turning drum takes along: friction,
+    anchors and the work of obstacles go on to the same bits."""
+    scene = """gravity: [0, 0, -9.81]
+simulation: {dt: 2e-3}
+rods:
+- {name: a, line: {from: [0, 0, 0.0052], to: [0.2, 0, 0.0052], edges: 10}, material: {radius: 0.005, young: 1e6, poisson: 0.4, density: 1000}}
+- {name: b, line: {from: [-0.1, 1, 0.1152], to: [0.1, 1, 0.1152], edges: 16}, material: {radius: 0.005, young: 1e6, poisson: 0.4, density: 1000}}
+constraints: [{type: pin, rod: a, vertex: last, stiffness: 2, motion: {velocity: [0.1, 0, 0]}}]
+contact: {friction: 0.4, STICK}
+colliders:
+- {name: floor, plane: {normal: [0, 0, 1]}}
+- {name: drum, cylinder: {radius: 0.1, length: 1, axis: [0, 1, 0]}, position: [0, 1, 0.01], motion: {angular_velocity: [0, 3, 0]}}
+"""
+    for stick in ("stick: creep", "stick: anchored"):
+        write(tmp + "/touching.yaml", scene.replace("STICK", stick))
+        for integrator in ("euler", "bdf2", "sdirk2", "midpoint", "generalized_alpha"):
+            base = ["-scene", tmp + "/touching.yaml", "-integrator", integrator, "-output_interval", 0.05]
+            run(0, *base, "-t_end", 0.1, "-output_dir", tmp + "/half")
+            with h5py.File(tmp + "/half/checkpoint.h5") as f:
+                assert f["contact_memory"].shape[0] > 0, (integrator, stick)
+            run(0, *base, "-t_end", 0.2, "-restart", tmp + "/half/checkpoint.h5", "-output_dir", tmp + "/on")
+            run(0, *base, "-t_end", 0.2, "-output_dir", tmp + "/whole")
+            same(final(tmp + "/on"), final(tmp + "/whole"))
+            done, all_of_it = rows(tmp + "/on"), rows(tmp + "/whole")
+            assert np.array_equal(done["work_supports"], all_of_it["work_supports"][-len(done):]), (integrator, stick)
+    print("friction goes on to the same bits")
+
+
 def signals(tmp):
     out = tmp + "/out"
     base = ["-scene", cantilever, "-dt", 1e-3, "-output_dir", out]
@@ -386,7 +415,7 @@ def full(tmp):
     print("full disks are told,", with_frames, "with frames")
 
 
-for test in (letGo, changes, balances, folders, automatic, orders, signals, full):
+for test in (letGo, changes, balances, folders, automatic, orders, touching, signals, full):
     if len(sys.argv) > 3 and test.__name__ not in sys.argv[3:]:
         continue
     with tempfile.TemporaryDirectory() as folder:

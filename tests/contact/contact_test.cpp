@@ -185,6 +185,48 @@ TEST(Contact, RestsAtTheDepthOfItsLaw) {
     }
 }
 
+/// contact_bounce.csv: a rod that falls flat on the penalty of the defaults. It comes back as high as it fell from.
+TEST(Contact, BouncesAsItsLawSays) {
+  for (const auto &row : rowsOf("contact_bounce.csv")) {
+    const double radius = row[0], height = row[1], deepest = row[3], duration = row[5], onset = 1e-3;
+    if (height < 0.01) continue; // a tenth of its fall is in the law
+    Scene scene;
+    scene.gravity = Vec3(0, 0, -9.81);
+    Rod rod = rubber(2, onset + height);
+    rod.material = homogeneousMaterial({SectionShape::circle, {radius, 0}}, 1e6, 4e5, 1000);
+    rod.contact = {};
+    rod.contact.law = ContactSettings::Law::penalty;
+    rod.contact.stiffness = 1e9;
+    scene.rods = {rod};
+    scene.colliders = {floorAt(0)};
+    std::vector<double> wrong;
+    for (const double parts : {50, 100}) {
+      LoopSettings settings = dynamics(duration / parts, 2 * std::sqrt(2 * height / 9.81) + duration);
+      settings.integrator.name = "midpoint";
+      Simulation sim;
+      EXPECT_PETSC(sim.setUp(scene, settings));
+      TimeLoop loop(sim.solver, settings);
+      bool finished = false;
+      double lowest = HUGE_VAL, touching = 0;
+      EXPECT_PETSC(loop.run(
+          sim.state,
+          [&](const State &state, const Diagnostics &step) {
+            lowest = std::min(lowest, state.position[1][2]);
+            if (step.contact_gap_min < onset) touching += step.dt;
+            return PetscErrorCode(0);
+          },
+          &finished));
+      ASSERT_TRUE(finished) << loop.failure();
+      EXPECT_NEAR(sim.state.position[1][2] - onset, height, 0.01 * height) << radius << " " << height;
+      EXPECT_NEAR(touching, duration, 2.5 * duration / parts);
+      wrong.push_back(lowest - deepest);
+    }
+    const double depth = onset - deepest;
+    EXPECT_NEAR(wrong[0], 0, 3e-3 * depth); // falls with the square of the step, as where the steps lie
+    EXPECT_NEAR(wrong[1], 0, 1e-3 * depth);
+  }
+}
+
 /// The moment at the clamp is the root of 2 B w H, whatever the height (contact_lowering.csv), with H to where the rod
 /// comes to lie.
 TEST(Contact, LoweredOntoAPlaneBearsTheMomentOfItsHeight) {
