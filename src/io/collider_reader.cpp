@@ -186,10 +186,18 @@ void readIgnored(YamlMap &scene, SceneFile &out) {
   }
 }
 
-void completeContact(const YamlValue &colliders, Scene &scene) {
+void completeContact(const YamlValue &colliders, const Overrides &overrides, Scene &scene) {
+  auto replace = [&](const char *name, double &value) {
+    if (const auto o = overrides.find(name); o != overrides.end()) value = std::stod(o->second);
+  };
   for (Rod &rod : scene.rods) {
     ContactSettings &contact = rod.contact;
     if (!contact.on) continue;
+    replace("contact_stiffness", contact.stiffness);
+    replace("contact_friction", contact.friction);
+    replace("contact_distance", contact.distance);
+    if (!contact.isBarrier() && overrides.count("contact_distance"))
+      throw SceneError("option -contact_distance: is for 'law: barrier', which rod '" + rod.name + "' has not");
     if (std::isnan(contact.radius)) {
       if (!rod.material.section)
         colliders.fail("rod '" + rod.name +

@@ -259,6 +259,16 @@ void readSolver(Texts &texts, Options *o) {
   o->loop.hessian = texts.word("-hessian") == "exact" ? HessianKind::exact : HessianKind::gauss_newton;
 }
 
+void readContact(const Texts &texts, Options *o) {
+  for (const KeyOf<KeyType::number> key :
+       {KeyOf<KeyType::number>("-contact_stiffness"), KeyOf<KeyType::number>("-contact_distance"),
+        KeyOf<KeyType::number>("-contact_friction")})
+    if (texts.isGiven(key->path)) {
+      (void)texts.number(key); // told now, where it is none
+      o->overrides[std::string(key->name())] = texts.text(*key);
+    }
+}
+
 void readMaterial(Texts &texts, Options *o) {
   for (const Key *key : rodOverrides())
     if (const std::string name(key->name()); texts.isGiven("-rod_" + name)) {
@@ -293,6 +303,7 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   readAccuracy(texts, o);
   readSolver(texts, o);
   readMaterial(texts, o);
+  readContact(texts, o);
   PetscCall(refuseUnsuited());
   texts.number("-snes_rtol"); // PETSc reads them, with less to say about mistakes
   texts.integer("-snes_max_it");

@@ -303,12 +303,15 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
     for (const YamlValue &v : map.at("loads").items()) readLoad(v, out);
   if (map.has("colliders")) {
     for (const YamlValue &v : map.at("colliders").items()) readCollider(v, out.scene);
-    if (!out.scene.colliders.empty()) completeContact(map.at("colliders"), out.scene);
+    if (!out.scene.colliders.empty()) completeContact(map.at("colliders"), overrides, out.scene);
   }
   if (map.has("contact") && out.scene.colliders.empty())
     map.at("contact").fail(
         "'contact' has nothing to act on: rods touch 'colliders', but not yet each other; add some, or "
         "take it away");
+  for (const auto &[name, value] : overrides)
+    if (name.rfind("contact_", 0) == 0 && out.scene.colliders.empty())
+      throw SceneError("option -" + name + ": the scene has no 'colliders' that rods could touch");
   readIgnored(map, out);
   map.finish();
   out.source.paths = {path};

@@ -121,7 +121,8 @@ def examples():
         if option:
             name = path if path.startswith("-") else "-rod_" + path.rpartition(".")[2]
             words = [] if path == "-scene" else [name, key["example"].replace("[", "").replace("]", "").replace(", ", ",")]
-            runs.append((exampleScene(path if not path.startswith("-") else "rods[].gravity", value if not path.startswith("-") else True), words))
+            other = ("contact.friction", 0.1) if path.startswith("-contact") else ("rods[].gravity", True)
+            runs.append((exampleScene(*(other if path.startswith("-") else (path, value))), words))
         for scene, words in runs:
             with tempfile.TemporaryDirectory() as folder:
                 with open(f"{folder}/s.yaml", "w") as f:

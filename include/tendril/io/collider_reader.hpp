@@ -14,7 +14,7 @@ void readContact(YamlMap &rod, ContactSettings &settings);
 void readCollider(const YamlValue &value, Scene &scene);
 /// Which rods pass which colliders, when both are there.
 void readIgnored(YamlMap &scene, SceneFile &out);
-/// What no key says. \param colliders for messages
-void completeContact(const YamlValue &colliders, Scene &scene);
+/// What no key says, and what options say instead. \param colliders for messages
+void completeContact(const YamlValue &colliders, const Overrides &overrides, Scene &scene);
 
 } // namespace tendril

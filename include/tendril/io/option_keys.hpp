@@ -98,6 +98,13 @@ inline constexpr Key option_keys[] = {
      "number of edges: n for all rods, or name:n with commas; the shapes are drawn again, places named by vertices "
      "stay",
      anything, "", "40", "rods"},
+    {"-contact_stiffness", KeyType::number, "N/m, N/m^2", "(of the scene)",
+     "of the contact of all rods, fixed: of a barrier, force per length; of a penalty, that over the depth", positive,
+     "", "64", "rods"},
+    {"-contact_distance", KeyType::number, "m", "(of the scene)", "width of the barrier of all rods", positive, "",
+     "5e-4", "rods"},
+    {"-contact_friction", KeyType::number, "", "(of the scene)", "coefficient of friction of all rods", not_negative, "",
+     "0.3", "rods"},
     {"-error_estimate", KeyType::flag, "", "false",
      "statics: solve again with half the edge length and tell the estimated error; dynamics: tell that in time, where "
      "the integrator leaves it",
