@@ -52,31 +52,6 @@ struct Contents {
   std::size_t strain_row = 0;
 };
 
-/// Per rod a number of rows of 3 + 6 numbers (ContactMemory).
-template <class Archive, class AnyState, class Whole> void exchangeContacts(Archive &a, AnyState &s, Whole &whole) {
-  std::size_t rods = s.contacts.size(), total = 0;
-  std::vector<double> counts;
-  std::vector<Vec3> rows;
-  for (const auto &of_rod : s.contacts) {
-    counts.push_back(double(of_rod.size()));
-    for (const ContactMemory &m : of_rod)
-      rows.insert(rows.end(), {Vec3(m.edge, m.point, m.collider), m.stick, m.friction});
-  }
-  total = rows.size();
-  whole("rods_with_friction", rods, 1e15);
-  whole("contact_rows", total, 1e15);
-  a.array("contact_counts", counts, rods);
-  a.array("contact_memory", rows, total);
-  if constexpr (Archive::reads) {
-    s.contacts.assign(rods, {});
-    std::size_t next = 0;
-    for (std::size_t r = 0; r < rods; ++r)
-      for (double n = 0; n < counts[r] && next + 3 <= rows.size(); ++n, next += 3)
-        s.contacts[r].push_back(
-            {int(rows[next][0]), int(rows[next][1]), int(rows[next][2]), rows[next + 1], rows[next + 2]});
-  }
-}
-
 template <class Archive, class AnyContents> void exchange(Archive &a, AnyContents &c, const Elements &elements) {
   auto whole = [&](const char *name, auto &value, [[maybe_unused]] double most) {
     if constexpr (Archive::reads)

@@ -89,12 +89,12 @@ struct ContactKeys {
 // clang-format off
 constexpr ContactKeys of_scene{
     "contact.law", "contact.friction_at", "contact.quadrature", "contact.stick", "contact.radius",
-    "contact.distance", "contact.stiffness", "contact.threshold", "contact.smoothing", "contact.friction", "contact.fall_off_velocity",
-    "contact.slip_length", "contact.tangential_damping", "contact.normal_damping"};
+    "contact.distance", "contact.stiffness", "contact.threshold", "contact.smoothing", "contact.friction",
+    "contact.fall_off_velocity", "contact.slip_length", "contact.tangential_damping", "contact.normal_damping"};
 constexpr ContactKeys of_rod{
     "rods[].contact.law", "rods[].contact.friction_at", "rods[].contact.quadrature", "rods[].contact.stick",
-    "rods[].contact.radius", "rods[].contact.distance", "rods[].contact.stiffness", "rods[].contact.threshold", "rods[].contact.smoothing",
-    "rods[].contact.friction", "rods[].contact.fall_off_velocity", "rods[].contact.slip_length",
+    "rods[].contact.radius", "rods[].contact.distance", "rods[].contact.stiffness", "rods[].contact.threshold",
+    "rods[].contact.smoothing", "rods[].contact.friction", "rods[].contact.fall_off_velocity", "rods[].contact.slip_length",
     "rods[].contact.tangential_damping", "rods[].contact.normal_damping"};
 // clang-format on
 

@@ -260,13 +260,10 @@ void readSolver(Texts &texts, Options *o) {
 }
 
 void readContact(const Texts &texts, Options *o) {
-  for (const KeyOf<KeyType::number> key :
-       {KeyOf<KeyType::number>("-contact_stiffness"), KeyOf<KeyType::number>("-contact_distance"),
-        KeyOf<KeyType::number>("-contact_friction")})
-    if (texts.isGiven(key->path)) {
-      (void)texts.number(key); // told now, where it is none
+  using Number = KeyOf<KeyType::number>;
+  for (const Number key : {Number("-contact_stiffness"), Number("-contact_distance"), Number("-contact_friction")})
+    if (texts.isGiven(key->path) && std::isfinite(texts.number(key))) // what is no number is told here
       o->overrides[std::string(key->name())] = texts.text(*key);
-    }
 }
 
 void readMaterial(Texts &texts, Options *o) {
