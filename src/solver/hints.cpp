@@ -59,8 +59,11 @@ std::string nearObstacle(const IncrementalPotential &potential, RodSet rods) {
     if (t.rod < rods.begin || t.rod >= rods.end || !(t.gap < (contact.isBarrier() ? -0.25 * contact.distance : 0)))
       continue;
     hint << std::setprecision(3) << "; rod '" << scene.rods[t.rod].name << "' is pressed against collider '"
-         << scene.colliders[t.collider].name << "' at arc length " << t.arc << " m, the gap is " << t.gap
-         << " m: is it held between obstacles, or driven into one? Shorter steps help against impacts";
+         << scene.colliders[t.collider].name << "' at arc length " << t.arc << " m, the gap is " << t.gap << " m: ";
+    if (contact.isBarrier())
+      hint << "is it held between obstacles, or driven into one? Shorter steps help against impacts";
+    else
+      hint << "the stiffness of its penalty, " << contact.stiffness << " N/m^2, is too small for what presses it there";
     break;
   }
   return hint.str();

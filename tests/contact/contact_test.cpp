@@ -418,6 +418,27 @@ TEST(Contact, ObstaclesThatTurnWithinAStepDoNotPass) {
   }
 }
 
+TEST(Contact, APenaltyTooSoftIsTold) {
+  Scene scene;
+  scene.gravity = Vec3::Zero();
+  scene.rods = {rubber(10, 0.05)};
+  scene.rods[0].initial_velocity = Vec3(0, 0, -20);
+  scene.rods[0].contact.law = ContactSettings::Law::penalty;
+  scene.rods[0].contact.stiffness = 1e5;
+  scene.colliders = {floorAt(0)};
+  const LoopSettings settings = dynamics(1e-3, 0.02);
+  Simulation sim;
+  EXPECT_PETSC(sim.setUp(scene, settings));
+  TimeLoop loop(sim.solver, settings);
+  bool finished = true;
+  EXPECT_PETSC(loop.run(
+      sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+  EXPECT_FALSE(finished);
+  EXPECT_NE(loop.failure().find("stiffness of its penalty, 1e+05 N/m^2, is too small"), std::string::npos)
+      << loop.failure();
+  for (const Vec3 &x : sim.state.position) EXPECT_GT(x[2], 0);
+}
+
 TEST(Contact, ObstaclesThatARodPassesAreNotThere) {
   Scene scene;
   scene.gravity = Vec3(0, 0, -10);
