@@ -270,10 +270,9 @@ private:
   /// Adds what a point remembers from before the step.
   void recall(SlidingPoint *point, const Mat3 &rotation, int r) const {
     const OfSliding &sliding = sliding_[r];
-    const auto key = std::tuple(point->slot - elements_.rods[r].first_slot, point->collider, point->point);
-    const auto found = std::lower_bound(sliding.before.begin(), sliding.before.end(), key,
-                                        [](const ContactMemory &m, const auto &k) { return m.key() < k; });
-    if (found == sliding.before.end() || found->key() != key) return;
+    const ContactMemory *found =
+        find(sliding.before, point->slot - elements_.rods[r].first_slot, point->collider, point->point);
+    if (!found) return;
     point->held = found->friction;
     if (!sliding.anchored) return;
     const Vec3 drawn = rotation * found->stick;

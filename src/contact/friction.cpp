@@ -4,7 +4,16 @@
 #include "tendril/energy/bend_twist.hpp"
 #include "tendril/energy/constraint.hpp"
 
+#include <algorithm>
+
 namespace tendril {
+
+const ContactMemory *find(const std::vector<ContactMemory> &memory, int edge, int collider, int point) {
+  const auto key = std::tuple(edge, collider, point);
+  const auto found = std::lower_bound(memory.begin(), memory.end(), key,
+                                      [](const ContactMemory &m, const auto &k) { return m.key() < k; });
+  return found != memory.end() && found->key() == key ? &*found : nullptr;
+}
 
 Vec3 wayOf(const SlidingPoint &point, const Configuration &c, const Collider::Pose &pose) {
   const Vec3 from = c.positionAt(point.slot);

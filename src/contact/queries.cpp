@@ -1,5 +1,5 @@
 /// What obstacles do to rods, for output and messages.
-#include "tendril/contact/contact.hpp"
+#include "tendril/contact/friction.hpp"
 
 #include <algorithm>
 
@@ -36,15 +36,10 @@ std::vector<ContactReading> contactReadings(const Scene &scene, const Elements &
       const ContactPoint point = contactPoint(scene, rod, samples, k);
       const int slot = samples.slot[k], edge = slot - elements.rods[r].first_slot;
       const Vec3 from = c.positionAt(slot), place = from + point.at * (c.positionAt(slot + 1) - from);
-      ContactReading reading{r,     samples.collider, edge,        point.at,    samples.distance[k],
-                             place, point.normal,     point.force, Vec3::Zero()};
-      const auto key = std::tuple(edge, samples.collider, samples.point[k]);
-      if (memory) {
-        const auto found = std::lower_bound(memory->begin(), memory->end(), key,
-                                            [](const ContactMemory &m, const auto &x) { return m.key() < x; });
-        if (found != memory->end() && found->key() == key) reading.friction = found->friction;
-      }
-      readings.push_back(reading);
+      const ContactMemory *found = memory ? find(*memory, edge, samples.collider, samples.point[k]) : nullptr;
+      const Vec3 friction = found ? found->friction : Vec3(Vec3::Zero());
+      readings.push_back({r, samples.collider, edge, point.at, samples.distance[k], place, point.normal.normalized(),
+                          point.force, friction});
     });
   }
   return readings;

@@ -24,10 +24,13 @@ struct SlidingPoint {
   Vec3 start = Vec3::Zero();   ///< from that point to the rod's when the step began, in the axes of the world [m]
 };
 
+/// What a sample remembers, or null. \param memory of its rod, in the order of keys
+const ContactMemory *find(const std::vector<ContactMemory> &memory, int edge, int collider, int point);
+
 /// Over what points slide in a step.
 struct Sliding {
-  double fall_off; ///< way below which friction falls off to zero [m]
-  double time;     ///< that the step has taken; 0 in statics [s]
+  double fall_off;    ///< way below which friction falls off to zero [m]
+  double time;        ///< that the step has taken; 0 in statics [s]
   bool holds = false; ///< whether nothing slides
 };
 
