@@ -12,11 +12,6 @@ namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
-/// That of the step that led to a state.
-NormalLaw lawOf(const Scene &scene, const State &state, int r) {
-  return {scene.rods[r].contact, state.contact_stiffness.empty() ? 0 : state.contact_stiffness[r]};
-}
-
 /// Sum of the momenta of the vertices of a rod, each relative to the obstacle nearest to it [kg m/s].
 double momentumTowards(const Scene &scene, const Elements &elements, const RodContacts &contacts, const State &state,
                        double dt, int r) {
@@ -167,7 +162,7 @@ public:
   void addEnergies(const State &state, const Configuration &c, double, int r, EnergyBudget &out) const override {
     if (!of_[r]) return;
     const RodContacts &rod = *of_[r];
-    const NormalLaw law = lawOf(scene_, state, r);
+    const NormalLaw law = lawOf(state, r);
     rod.visitTouching(c, law, [&](const Samples &samples, int k) {
       out.contact += rod.weight(samples, k) * law(samples.distance[k]).value;
     });
@@ -200,6 +195,12 @@ private:
   bool slides_ = false;
   std::vector<OfSliding> sliding_; ///< per rod
 
+  /// That of the step that led to a state; of the first step where none has.
+  NormalLaw lawOf(const State &state, int r) const {
+    if (state.contact_stiffness.empty()) return of_[r]->law();
+    return {scene_.rods[r].contact, state.contact_stiffness[r]};
+  }
+
   void setStiffness(const State &state, const Configuration &start, const Step &step, int r) {
     RodContacts &rod = *of_[r];
     double stiffness = scene_.rods[r].contact.stiffness;
@@ -212,9 +213,15 @@ private:
       if (!step.isStatic() && pressure > 0 && pressure <= bearable * before)
         stiffness = before;
       else {
-        double force = loadScale(scene_, r, elements_.length(r));
+        const double length = elements_.length(r);
+        double force = loadScale(scene_, r, length);
         if (!step.isStatic()) force += momentumTowards(scene_, elements_, rod, state, step.dt, r) / step.dt;
         stiffness = barrierStiffness(scene_, elements_, force, pressure, r);
+        if (!step.isStatic() && before == 0 && force > 0) { // what is drawn touching is not thrown off
+          rod.setStiffness(stiffness);
+          if (const double pressed = largestPressure(rod, start); pressed > force / length)
+            stiffness *= force / (length * pressed);
+        }
       }
     }
     rod.setStiffness(stiffness);
@@ -251,7 +258,7 @@ private:
     else
       sliding.before = state.contacts[r];
     sliding.sliding.holds = step.isStatic(); // until it is known what presses, or loads of later would find no friction
-    sliding.points = slidingPoints(start, state.contact_stiffness.empty() ? of_[r]->law() : lawOf(scene_, state, r), r);
+    sliding.points = slidingPoints(start, lawOf(state, r), r);
   }
 
   /// What a point remembers. Where it slides, its anchor follows within the fall-off.

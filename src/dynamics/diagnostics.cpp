@@ -22,7 +22,7 @@ const std::vector<DiagnosticsColumn> &diagnosticsColumns() {
       {"rejected_iterations", "1", [](const D &d) { return double(d.rejected_iterations); }},
       {"rounding_error", "1", [](const D &d) { return d.rounding_error; }},
       {"work_loads", "J", [](const D &d) { return d.work.loads; }},
-      {"work_supports", "J", [](const D &d) { return d.work.supports; }},
+      {"work_supports", "J", [](const D &d) { return d.work.supports + d.work.obstacles; }},
       {"constraint", "J", [](const D &d) { return d.energy.constraint; }},
       {"contact", "J", [](const D &d) { return d.energy.contact; }},
       {"contact_gap_min", "m", [](const D &d) { return d.contact_gap_min; }}};

@@ -110,8 +110,9 @@ Work TimeLoop::dynamicWork(const State &start, double h) const {
     return sum;
   };
   for (std::size_t k = 0; k < moving_.size(); ++k)
-    work.supports += workOf(moving_[k], {mean(2 * k), mean(2 * k + 1)}, potential.elements(), potential.start(),
-                            potential.iterate(), start.time, potential.step().time);
+    (moving_[k].collider ? work.obstacles : work.supports) +=
+        workOf(moving_[k], {mean(2 * k), mean(2 * k + 1)}, potential.elements(), potential.start(), potential.iterate(),
+               start.time, potential.step().time);
   return work;
 }
 

@@ -82,7 +82,7 @@ PetscErrorCode TimeLoop::attempt(const State &state, State *next, Attempt *now) 
   now->work = staticWork(potential.scene(), potential.elements(), state, *next, potential.start(), potential.iterate());
   for (const Holder &h : moving_)
     if (h.collider)
-      now->work.supports += workOf(h, solver_.potential().actionOf(h), potential.elements(), potential.start(),
+      now->work.obstacles += workOf(h, solver_.potential().actionOf(h), potential.elements(), potential.start(),
                                    potential.iterate(), state.time, next->time);
   PetscFunctionReturn(0);
 }

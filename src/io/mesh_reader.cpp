@@ -54,23 +54,6 @@ int cornerOf(const std::string &word, int vertices, const std::string &path, int
   return int(index);
 }
 
-TriangleMesh readObj(const std::string &text, const std::string &path) {
-  TriangleMesh mesh;
-  std::istringstream file(text);
-  std::string line, word;
-  for (int number = 1; std::getline(file, line); ++number) {
-    std::istringstream in(line.substr(0, line.find('#')));
-    if (!(in >> word)) continue;
-    if (word == "v") mesh.vertices.push_back(pointOf(in, path, number));
-    if (word != "f") continue;
-    std::vector<int> corners;
-    while (in >> word) corners.push_back(cornerOf(word, int(mesh.vertices.size()), path, number));
-    if (corners.size() < 3) fail(path, number, "a face needs three vertices or more");
-    for (std::size_t k = 2; k < corners.size(); ++k) mesh.triangles.push_back({corners[0], corners[k - 1], corners[k]});
-  }
-  return mesh;
-}
-
 /// Joins corners at the same place.
 class Corners {
 public:
@@ -91,6 +74,25 @@ private:
   std::map<std::array<double, 3>, int> numbers_;
 };
 
+TriangleMesh readObj(const std::string &text, const std::string &path) {
+  TriangleMesh mesh;
+  Corners corners(mesh);
+  std::vector<Vec3> points;
+  std::istringstream file(text);
+  std::string line, word;
+  for (int number = 1; std::getline(file, line); ++number) {
+    std::istringstream in(line.substr(0, line.find('#')));
+    if (!(in >> word)) continue;
+    if (word == "v") points.push_back(pointOf(in, path, number));
+    if (word != "f") continue;
+    std::vector<Vec3> face;
+    while (in >> word) face.push_back(points[std::size_t(cornerOf(word, int(points.size()), path, number))]);
+    if (face.size() < 3) fail(path, number, "a face needs three vertices or more");
+    for (std::size_t k = 2; k < face.size(); ++k) corners.add({face[0], face[k - 1], face[k]});
+  }
+  return mesh;
+}
+
 TriangleMesh readTextStl(const std::string &text, const std::string &path) {
   TriangleMesh mesh;
   Corners corners(mesh);
@@ -110,6 +112,7 @@ TriangleMesh readTextStl(const std::string &text, const std::string &path) {
     corners.add(triangle);
     count = 0;
   }
+  if (count > 0) throw SceneError(path + ": ends within a facet: is the file cut off?");
   return mesh;
 }
 
@@ -145,6 +148,10 @@ TriangleMesh readMesh(const std::string &path) {
     mesh = readObj(bytes, path);
   else if (bytes.size() >= 84 && bytes.size() == 84 + std::size_t(50) * count)
     mesh = readBinaryStl(bytes, count, path);
+  else if (bytes.size() >= 84 && bytes.compare(0, 5, "solid") != 0)
+    throw SceneError(path + ": says that it has " + std::to_string(count) + " triangles, in " +
+                     std::to_string(84 + std::size_t(50) * count) + " bytes, and has " + std::to_string(bytes.size()) +
+                     ": is the file cut off?");
   else
     mesh = readTextStl(bytes, path);
   if (mesh.triangles.empty()) throw SceneError(path + ": has no triangles");

@@ -170,7 +170,7 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
       const bool remain = potential_->obstaclesRemain(r),
                  go = remain && (!potential_->step().isStatic() || excess(residual, rtol_obstacles) <= 1 ||
                                  isAtNoise(residual, rtol_obstacles));
-      potential_->holdObstacles(r, !go);
+      potential_->holdObstacles(r, remain && !go);
       work_->moving[r] = (moving && dot(rod, work_->motion, work_->motion) > 0) || go;
       finite = finite && residual.isFinite();
       const Verdict verdict = residual.isFinite() && !work_->moving[r] && !remain ? judge(r, rtol) : Verdict::going;

@@ -326,7 +326,6 @@ TEST(Contact, ObstaclesThatMoveTakeRodsAlong) {
   for (const Vec3 &v : sim.state.velocity) EXPECT_NEAR(v[2], 0.2, 1e-3); // backward Euler damps the first jolt
 }
 
-/// A ram that has come down by 0.06 m after a fiftieth of the load step, on a rod held at both ends.
 /// At best, a plate that does not give way throws a rod off twice as fast as it comes. No step may have energy of its
 /// own to add, however stiff the barrier would have to be for the rod's own velocity.
 TEST(Contact, AMovingPlateThrowsARodAtMostTwiceAsFast) {
@@ -347,7 +346,7 @@ TEST(Contact, AMovingPlateThrowsARodAtMostTwiceAsFast) {
     EXPECT_PETSC(loop.run(
         sim.state,
         [&](const State &, const Diagnostics &row) {
-          work += row.work.supports;
+          work += row.work.obstacles;
           return PetscErrorCode(0);
         },
         &finished));
@@ -367,6 +366,7 @@ TEST(Contact, AMovingPlateThrowsARodAtMostTwiceAsFast) {
   }
 }
 
+/// A ram that has come down by 0.06 m after a fiftieth of the load step, on a rod held at both ends.
 TEST(Contact, ObstaclesThatMoveUnevenlyWithinAStepDoNotPass) {
   for (const double corner : {0.02, 0.3}) {
     Scene scene;
@@ -451,6 +451,64 @@ TEST(Contact, ObstaclesThatARodPassesAreNotThere) {
   for (int i = 0; i <= 10; ++i) {
     EXPECT_NEAR(sim.state.position[i][2], 0.005, 0.0005);
     EXPECT_NEAR(sim.state.position[11 + i][2], -0.045, 0.0005);
+  }
+}
+
+/// A rod that lies on its floor within the barrier as drawn is borne as drawn.
+TEST(Contact, WhatIsDrawnTouchingStays) {
+  for (const double gap : {0.0, 0.25e-3, -0.4e-3}) {
+    Scene scene;
+    scene.gravity = Vec3(0, 0, -9.81);
+    scene.rods = {rubber(20, 0.005 + gap)};
+    scene.colliders = {floorAt(0)};
+    const LoopSettings settings = dynamics(1e-3, 0.02);
+    Simulation sim;
+    EXPECT_PETSC(sim.setUp(scene, settings));
+    EXPECT_PETSC(sim.solver.rehearse(sim.state, TimeLoop::stepOf(settings, sim.state, settings.dt)));
+    TimeLoop loop(sim.solver, settings);
+    const double small = 1e-6 * 0.3 * scene.rods[0].material.linear_density * 9.81 * scene.rods[0].contact.distance;
+    bool finished = false;
+    EXPECT_PETSC(loop.run(
+        sim.state,
+        [&](const State &, const Diagnostics &row) {
+          EXPECT_LT(row.energy.kinetic, small);
+          EXPECT_LT(std::abs(row.dissipated), small);
+          return PetscErrorCode(0);
+        },
+        &finished));
+    ASSERT_TRUE(finished) << loop.failure();
+    EXPECT_NEAR(sim.state.position[7][2], 0.005 + gap, 1e-12);
+  }
+}
+
+/// Methods that go on beyond their middle take obstacles with them to the end of the step.
+TEST(Contact, StepsEndWithObstaclesAtTheirEnd) {
+  for (const char *method : {"euler", "midpoint", "energy_momentum"}) {
+    Scene scene;
+    scene.gravity = Vec3::Zero();
+    scene.rods = {rubber(20, 0.0056)};
+    scene.colliders = {floorAt(0)};
+    scene.colliders[0].motion.velocity = Vec3(0, 0, 0.2);
+    LoopSettings settings = dynamics(1e-3, 0.03);
+    settings.integrator.name = method;
+    Simulation sim;
+    EXPECT_PETSC(sim.setUp(scene, settings));
+    TimeLoop loop(sim.solver, settings);
+    bool finished = false;
+    double least = HUGE_VAL;
+    EXPECT_PETSC(loop.run(
+        sim.state,
+        [&](const State &state, const Diagnostics &row) {
+          double lowest = HUGE_VAL;
+          for (const Vec3 &x : state.position) lowest = std::min(lowest, x[2]);
+          EXPECT_NEAR(row.contact_gap_min, lowest - 0.005 - 0.2 * state.time, 1e-9) << method;
+          least = std::min(least, row.contact_gap_min);
+          return PetscErrorCode(0);
+        },
+        &finished));
+    ASSERT_TRUE(finished) << loop.failure();
+    EXPECT_LT(least, 0.0005) << method; // they touch
+    EXPECT_GT(least, -0.0005) << method;
   }
 }
 

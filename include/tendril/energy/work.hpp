@@ -9,11 +9,12 @@ namespace tendril {
 
 /// [J]
 struct Work {
-  double loads = 0, supports = 0;
-  double total() const { return loads + supports; }
+  double loads = 0, supports = 0, obstacles = 0;
+  double total() const { return loads + supports + obstacles; }
   Work &operator+=(const Work &other) {
     loads += other.loads;
     supports += other.supports;
+    obstacles += other.obstacles;
     return *this;
   }
 };

@@ -48,7 +48,8 @@ private:
   long steps_ = 0, iterations_ = 0, rejected_ = 0;
   bool told_unstable_ = false;
   WidestAngle widest_;
-  double dissipated_ = 0, gained_ = 0, work_ = 0, most_kinetic_ = 0; ///< [J]
+  double dissipated_ = 0, gained_ = 0, work_ = 0, work_of_obstacles_ = 0; ///< [J]
+  double most_kinetic_ = 0, first_stored_ = NAN, most_stored_ = 0;        ///< [J]
 
   void tellInstability(const Diagnostics &row);
 };
