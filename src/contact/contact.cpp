@@ -143,21 +143,30 @@ public:
     auto same = [](const SlidingPoint &a, const SlidingPoint &b) {
       return a.slot == b.slot && a.point == b.point && a.collider == b.collider;
     };
-    std::size_t next = 0; // both lists are in one order
+    std::size_t next = 0;        // both lists are in one order
+    std::vector<double> pressed; // before, at the same points
     for (const SlidingPoint &point : now) {
       const SlidingForce force = forceOn(point, iterate, r);
       size += std::max(point.coefficient * point.pressing, force.gradient.norm());
       const auto found = std::find_if(sliding.points.begin() + next, sliding.points.end(),
                                       [&](const SlidingPoint &old) { return same(old, point); });
       Vec3 before = Vec3::Zero();
+      pressed.push_back(0);
       if (found != sliding.points.end()) {
+        pressed.back() = found->pressing;
         before = forceOn(*found, held, iterate, r).gradient;
         next = std::size_t(found - sliding.points.begin()) + 1;
       }
       change += (force.gradient - before).norm();
     }
+    change = size > 0 ? change / size : 0;
+    constexpr double falls = 0.9; // rounds that go to and fro are led to their middle
+    sliding.swings = sliding.swings || (++sliding.rounds > 2 && change > falls * sliding.change);
+    if (sliding.swings)
+      for (std::size_t k = 0; k < now.size(); ++k) now[k].pressing = 0.5 * (now[k].pressing + pressed[k]);
+    sliding.change = change;
     sliding.points = std::move(now);
-    return size > 0 ? change / size : 0;
+    return change;
   }
   void addEnergies(const State &state, const Configuration &c, double, int r, EnergyBudget &out) const override {
     if (!of_[r]) return;
@@ -190,6 +199,9 @@ private:
     Sliding sliding;
     const Configuration *start = nullptr;
     bool anchored = false;
+    int rounds = 0;                    ///< of the step, in which normal forces were taken anew
+    bool swings = false;               ///< whether they go to and fro
+    double change = 0;                 ///< of friction in the last of them, of itself
     std::vector<ContactMemory> before; ///< at the start of the step
   };
   bool slides_ = false;
@@ -250,6 +262,8 @@ private:
     const double time = step.isStatic() ? 0 : step.time > state.time ? step.time - state.time : step.dt;
     OfSliding &sliding = sliding_[r];
     sliding.anchored = settings.isAnchored(step.isStatic());
+    sliding.rounds = 0;
+    sliding.swings = false;
     sliding.sliding = {sliding.anchored || step.isStatic() ? settings.slip_length : settings.fall_off_velocity * time,
                        time};
     sliding.start = &start;
