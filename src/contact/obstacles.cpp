@@ -129,20 +129,26 @@ double RodContacts::freeFraction(const Configuration &from, const Configuration 
     const Samples here = samplesOf(from, there.chunk, there.collider, there.first);
     struct Way {
       Vec3 from, way;
-      double length, gap, stop, done;
+      double closing, gap, stop, done; // the gap falls by no more than `closing` times the part of the way
     };
     std::array<Way, Samples::most> ways;
+    const Shape &shape = *scene_.colliders[there.collider].shape;
+    const bool convex = shape.isConvex();
+    auto approaches = [&](Way *w) {
+      if (convex) w->closing = -shape.at(w->from + w->done * w->way).gradient.dot(w->way);
+      return w->closing > 0;
+    };
     int count = 0;
     for (int k = 0; k < there.count; ++k) {
       Way w;
       w.from = here.at(k);
       w.way = there.at(k) - w.from;
-      w.length = w.way.norm();
+      w.closing = w.way.norm();
       w.gap = here.distance[k] - wall;
       w.stop = near * std::min(w.gap, settings_.isBarrier() ? settings_.distance : settings_.radius);
-      if (w.gap > w.length + w.stop) continue;
+      if (w.gap > w.closing + w.stop) continue;
       w.done = 0;
-      ways[count++] = w;
+      if (approaches(&w)) ways[count++] = w;
     }
     for (int step = 0; step < most_steps && count > 0; ++step) {
       std::array<std::array<double, Samples::most>, 3> x;
@@ -150,19 +156,19 @@ double RodContacts::freeFraction(const Configuration &from, const Configuration 
       int going = 0;
       for (int k = 0; k < count; ++k) {
         Way w = ways[k];
-        w.done += safety * std::max(w.gap, 0.0) / w.length;
+        w.done += safety * std::max(w.gap, 0.0) / w.closing;
         if (w.done >= free) continue;
         for (int a = 0; a < 3; ++a) x[a][going] = w.from[a] + w.done * w.way[a];
         ways[going++] = w;
       }
       const double *const points[3] = {x[0].data(), x[1].data(), x[2].data()};
-      scene_.colliders[there.collider].shape->distances(points, going, distance.data());
+      shape.distances(points, going, distance.data());
       count = 0;
       for (int k = 0; k < going; ++k) {
         ways[k].gap = distance[k] - settings_.radius - wall;
         if (ways[k].gap <= ways[k].stop)
           free = std::min(free, ways[k].done);
-        else
+        else if (approaches(&ways[k]))
           ways[count++] = ways[k];
       }
     }

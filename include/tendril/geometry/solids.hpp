@@ -24,6 +24,7 @@ struct HalfSpaceSolid {
   template <class T> T distance(const Vector3<T> &x) const { return x[2]; }
   Distance at(const Vec3 &x) const { return {x[2], Vec3::UnitZ(), Mat3::Zero()}; }
   double curvatureRadius() const { return HUGE_VAL; }
+  bool isConvex() const { return true; }
 };
 
 /// A sphere, or with a length a capsule.
@@ -38,6 +39,7 @@ struct CapsuleSolid {
   }
   Distance at(const Vec3 &x) const;
   double curvatureRadius() const { return radius; }
+  bool isConvex() const { return true; }
 };
 
 /// Between two radii and two planes about the axis z.
@@ -58,6 +60,7 @@ struct TubeSolid {
   }
   Distance at(const Vec3 &x) const;
   double curvatureRadius() const { return half < HUGE_VAL ? 0 : bore < 0 ? outer : HUGE_VAL; }
+  bool isConvex() const { return bore < 0; }
 };
 
 struct BoxSolid {
@@ -78,6 +81,7 @@ struct BoxSolid {
   }
   Distance at(const Vec3 &x) const;
   double curvatureRadius() const { return 0; }
+  bool isConvex() const { return true; }
 };
 
 } // namespace tendril
