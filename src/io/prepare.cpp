@@ -40,6 +40,21 @@ void refuseOverlaps(const Simulation &run) {
   }
 }
 
+/// Of the rods whose edges are long for obstacles that are not much larger than they are thick.
+std::vector<std::string> longEdges(const Simulation &run) {
+  constexpr double longest = 20; // radii
+  std::vector<std::string> notes;
+  for (int r = 0; r < int(run.scene.rods.size()); ++r) {
+    const RodRange &rod = run.elements->rods[r];
+    const double radius = run.scene.rods[r].contact.radius, *rest = run.elements->restLength(),
+                 edge = *std::max_element(rest + rod.first_slot, rest + rod.edgeEnd());
+    if (run.scene.touches(r) && radius > 0 && edge >= longest * radius * (1 - 1e-9))
+      notes.push_back("warning: rod '" + run.scene.rods[r].name + "' has edges of up to " + shortText(edge / radius) +
+                      " of its radii: it may miss obstacles that are smaller; shorter edges feel them");
+  }
+  return notes;
+}
+
 /// Where a rod begins to touch moves with the edges: errors do not fall with the square of their length.
 void refuseWithObstacles(const Options &o) {
   const bool arc = !o.loop.dynamic && o.loop.continuation == Continuation::arclength;
@@ -104,6 +119,7 @@ PetscErrorCode prepare(Prepared &prepared, Options &o) {
   }
   if (!o.rod_edges.empty()) remeshAsAsked(file, o);
   PetscCall(makeReady(std::move(file.scene), o, prepared.run));
+  for (std::string &note : longEdges(*prepared.run)) prepared.notes.push_back(std::move(note));
   PetscCall(PetscLogStagePop());
   PetscFunctionReturn(0);
 }
