@@ -137,6 +137,14 @@ TEST(Banded, SolvesChainsRingsAndSetsOfThem) {
   }
 }
 
+/// Where the border of a ring falls off along it and is dropped on the way.
+TEST(Banded, SolvesRingsWhoseBorderFallsOff) {
+  for (const double diagonal : {400.0, -400.0}) {
+    for (const bool held : {false, true}) expectSolvesAndCounts({-32}, diagonal, held);
+    expectSolvesAndCounts(std::vector<int>(lanes, -20), diagonal, false);
+  }
+}
+
 /// More rods of one shape than lanes, so that some are factored in packs, some in a pack that is not full, and some
 /// alone.
 TEST(Banded, SolvesManyRodsOfOneShape) {

@@ -36,6 +36,7 @@ public:
       factorSmall<3>(a, scale, first, first + 3, negative, zero);
     else
       std::fill_n(first, 6, T(0.0));
+    first[border_begin] = T(double(bordered_from_));
   }
 
   T negative{0.0}, zero{0.0};
@@ -48,6 +49,8 @@ private:
   T *const records_;
   Square<T> state_;
   Square<T> mixed_, corner_; ///< of a ring: state with border, border with itself
+  T first_mixed_{0.0};       ///< its largest entry so far
+  int bordered_from_ = 0;    ///< edges before it have no border any more
 
   T *record(int i) const { return records_ + std::size_t(i) * (ring ? Record<T>::bordered : Record<T>::plain); }
   bool nextHeld(int i) const { return held_[ring && i == last_ ? 0 : i + 1]; }
@@ -84,7 +87,7 @@ private:
 #pragma GCC unroll 3
       for (int r = 0; r < 3; ++r) state_[edge_at + r].add(state_[r]);
     }
-    if (!ring) return;
+    if (!ring || bordered_from_ > 0) return;
     for (int r = 0; r < 3; ++r)
       if (held)
         mixed_[r] = {};
@@ -145,7 +148,7 @@ private:
 #pragma GCC unroll 7
       for (int k = 0; k < state_size; ++k) next[k].subtract(y[p][k], z[p], k);
     Row<T>::symmetrise(next);
-    if constexpr (ring) {
+    if (ring && bordered_from_ == 0) {
       Row<T> bs[edge_size];
       for (int r = 0; r < edge_size; ++r) {
         bs[r] = mixed_[edge_at + r];
@@ -153,6 +156,7 @@ private:
       }
       reduce(bs, l);
       border(y, bs, d, l, out);
+      if (i % 8 == 0) dropBorder(i);
     }
     complete(z, l, out);
 #pragma GCC unroll 7
@@ -190,6 +194,19 @@ private:
       }
     }
     complete(z, l, out + Record<T>::plain);
+  }
+
+  /// In dynamics a border falls off along the rod: left to itself it would end in denormal numbers, which are slow.
+  void dropBorder(int i) {
+    using std::abs, std::max;
+    constexpr double none = 1e-20; // of its beginning: what it would add is its square
+    T most(0.0);
+    for (const Row<T> &row : mixed_)
+      for (int c = 0; c < state_size; ++c) most = max(most, T(abs(row[c])));
+    first_mixed_ = max(first_mixed_, most);
+    if (!allOf(most <= T(none) * first_mixed_)) return;
+    for (Row<T> &row : mixed_) row = {};
+    bordered_from_ = i;
   }
 
   /// Edge i between vertex i and a held one: e = -x. Only its twist is eliminated.
@@ -309,7 +326,7 @@ template <class T, bool ring>
                                     const T *first, T *values) {
   constexpr int w = Record<T>::width;
   constexpr std::size_t size = ring ? Record<T>::bordered : Record<T>::plain;
-  const int last = rod.vertices - 1;
+  const int last = rod.vertices - 1, border_end = ring ? std::max(1, int(firstLane(first[border_begin]))) : 0;
   auto nextHeld = [&](int i) { return held[ring && i == last ? 0 : i + 1]; };
   T q[state_size], border[state_size];
   std::fill_n(q, state_size, T(0.0));
@@ -339,7 +356,7 @@ template <class T, bool ring>
 #pragma GCC unroll 4
       for (int p = 1; p < edge_size; ++p) share += g[p * w + c] * r[p];
       next[c] = (c < 3 ? q[c] + here[c] : T(0.0)) - share;
-      if (ring && i > 0) {
+      if (ring && i >= border_end) {
         const T *gs = g + Record<T>::plain;
         T far = gs[c] * r[0];
         for (int p = 1; p < edge_size; ++p) far += gs[p * w + c] * r[p];
@@ -364,7 +381,7 @@ template <class T, bool ring>
     T v[edge_size];
     std::copy_n(here, edge_size, v);
     solveSmall<edge_size>(g + Record<T>::lower, g + Record<T>::pivots, v);
-    if (ring && i > 0) {
+    if (ring && i >= border_end) {
       const T *gs = g + Record<T>::plain;
       for (int p = 0; p < edge_size; ++p)
         for (int c = 0; c < state_size; ++c) v[p] -= gs[p * w + c] * border[c];

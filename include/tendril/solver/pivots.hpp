@@ -21,6 +21,11 @@ template <class T> T inversePivot(const T &d, const T &scale, T &negative, T &ze
   return select(lost, T(0.0), T(1.0) / d);
 }
 
+inline double firstLane(double x) { return x; }
+inline double firstLane(const Pack &x) { return x[0]; }
+inline bool allOf(bool condition) { return condition; }
+inline bool allOf(const Pack::mask_type &condition) { return all_of(condition); }
+
 /// A row over the variables of the state: of one rod in a register, of a pack of rods as so many packs.
 typedef double Octet __attribute__((vector_size(64), aligned(8)));
 template <class T> struct Row;
@@ -90,6 +95,8 @@ template <class T> struct Record {
 
 /// Numbers kept of the first vertex: L and inverse pivots of its position.
 inline constexpr std::size_t vertex_record = 8;
+/// ... and, of a ring, at which edge its border begins: those before have none.
+inline constexpr std::size_t border_begin = 6;
 
 /// L below the diagonal, row by row.
 inline constexpr int below(int r, int c) { return r * (r - 1) / 2 + c; }
