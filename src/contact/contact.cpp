@@ -12,7 +12,7 @@ namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
-/// Sum of the momenta of the vertices of a rod, each relative to the obstacle nearest to it [kg m/s].
+/// Sum of the momenta of the vertices of a rod towards the obstacles that they may meet in the step [kg m/s].
 double momentumTowards(const Scene &scene, const Elements &elements, const RodContacts &contacts, const State &state,
                        double dt, int r) {
   const RodRange &rod = elements.rods[r];
@@ -21,11 +21,25 @@ double momentumTowards(const Scene &scene, const Elements &elements, const RodCo
     poses.push_back({collider.poseAt(state.time), collider.poseAt(state.time + dt)});
   double sum = 0;
   for (int i = 0; i < rod.vertices; ++i) {
-    const auto &[from, to] = poses[contacts.nearestTo(i)];
     const Vec3 &x = state.position[rod.first_vertex + i];
-    const Vec3 moved = to.fromLocal(from.toLocal(x)) - x;
-    sum += elements.mass()[rod.slot(i)] * (state.velocity[rod.first_vertex + i] - moved / dt).norm();
+    double towards = 0;
+    for (std::size_t k = 0; k < poses.size(); ++k) {
+      const auto &[from, to] = poses[k];
+      const Vec3 local = from.toLocal(x), way = state.velocity[rod.first_vertex + i] * dt - (to.fromLocal(local) - x);
+      if (contacts.mayMeet(i, int(k), way.norm()))
+        towards = std::max(towards, -way.dot(from.rotation * scene.colliders[k].shape->at(local).gradient));
+    }
+    sum += elements.mass()[rod.slot(i)] * towards / dt;
   }
+  return sum;
+}
+
+/// Sum of the loads on a rod [N].
+Vec3 resultantLoad(const Scene &scene, int r, double length) {
+  const Rod &rod = scene.rods[r];
+  Vec3 sum = rod.gravity ? Vec3(rod.material.linear_density * length * scene.gravity) : Vec3(Vec3::Zero());
+  for (const NodalForce &f : scene.forces)
+    if (f.rod == r) sum += f.force;
   return sum;
 }
 
@@ -181,7 +195,7 @@ public:
   }
   void commit(State &state, const Configuration &c, int r) const override {
     if (state.contact_stiffness.empty()) state.contact_stiffness.assign(scene_.rods.size(), 0);
-    if (of_[r]) state.contact_stiffness[r] = of_[r]->law().stiffness();
+    if (of_[r] && scene_.rods[r].contact.isBarrier()) state.contact_stiffness[r] = of_[r]->law().stiffness();
     if (!slides_) return;
     state.contacts.resize(scene_.rods.size());
     state.contacts[r].clear();
@@ -221,18 +235,19 @@ private:
       rod.setStiffness(before);
       const double pressure = before > 0 ? largestPressure(rod, start) : 0;
       // A barrier that grew while it is pressed would throw the rod off.
-      constexpr double bearable = 100;
+      constexpr double bearable = 1e4;
       if (!step.isStatic() && pressure > 0 && pressure <= bearable * before)
         stiffness = before;
       else {
         const double length = elements_.length(r);
         double force = loadScale(scene_, r, length);
-        if (!step.isStatic()) force += momentumTowards(scene_, elements_, rod, state, step.dt, r) / step.dt;
+        const double stopping =
+            step.isStatic() ? 0 : momentumTowards(scene_, elements_, rod, state, step.dt, r) / step.dt;
+        force += stopping;
         stiffness = barrierStiffness(scene_, elements_, force, pressure, r);
-        if (!step.isStatic() && before == 0 && force > 0) { // what is drawn touching is not thrown off
+        if (!step.isStatic() && before == 0) { // what is drawn touching is not thrown off
           rod.setStiffness(stiffness);
-          if (const double pressed = largestPressure(rod, start); pressed > force / length)
-            stiffness *= force / (length * pressed);
+          stiffness *= partBorne(rod, start, resultantLoad(scene_, r, length), stopping);
         }
       }
     }
@@ -246,6 +261,22 @@ private:
       most = std::max(most, -rod.law()(samples.distance[k]).slope);
     });
     return most;
+  }
+
+  /// Part of the forces of the law that is set which the loads of a rod, and what stops it, press against; at least a
+  /// thousandth, at most all.
+  double partBorne(const RodContacts &rod, const Configuration &c, const Vec3 &load, double stopping) const {
+    constexpr double least = 1e-3;
+    Vec3 resultant = Vec3::Zero();
+    double pressed = 0;
+    rod.visitTouching(c, rod.law(), [&](const Samples &samples, int k) {
+      const Vec3 force = contactPoint(scene_, rod, samples, k).force;
+      resultant += force;
+      pressed += force.norm();
+    });
+    if (pressed == 0) return 1;
+    const double size = resultant.norm(), against = size > 0 ? -load.dot(resultant) / size : 0;
+    return std::clamp((std::max(0.0, against) + stopping) / pressed, least, 1.0);
   }
 
   SlidingForce forceOn(const SlidingPoint &point, const Configuration &c, int r) const {

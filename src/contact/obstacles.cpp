@@ -30,19 +30,21 @@ RodContacts::RodContacts(const Scene &scene, const Elements &elements, int rod)
     points_.push_back(
         samplePoints(settings_.quadrature, longest,
                      0.56 * std::sqrt(2 * (collider.shape->curvatureRadius() + settings_.radius) * 2 * law_.reach())));
-  for (AlignedVector &x : seen_) x.assign(rod_.edges + 1 + lanes, 0.0);
+  for (const Collider &collider : scene.colliders) walls_.push_back(settings_.wall(*collider.shape));
+  for (AlignedVector &x : seen_) x.assign(seenOf(chunks()) + lanes, 0.0);
 }
 
 double RodContacts::movedSince(const Configuration &c, int chunk) const {
-  const int begin = chunk * chunk_edges, end = begin + edgesOf(chunk);
+  const int slot = rod_.slot(chunk * chunk_edges), count = edgesOf(chunk) + 1;
   Pack most(0.0);
-  for (int i = begin; i <= end; i += lanes) {
+  for (int i = 0; i < count; i += lanes) {
     Pack sum(0.0);
     for (int a = 0; a < 3; ++a) {
-      const Pack d = read<Pack>(c[C::Plane(C::position + a)] + rod_.slot(i)) - read<Pack>(seen_[a].data() + i);
+      const Pack d =
+          read<Pack>(c[C::Plane(C::position + a)] + slot + i) - read<Pack>(seen_[a].data() + seenOf(chunk) + i);
       sum += d * d;
     }
-    most = max(most, end - i + 1 < lanes ? select(firstLanes(end - i + 1), sum, Pack(0.0)) : sum);
+    most = max(most, count - i < lanes ? select(firstLanes(count - i), sum, Pack(0.0)) : sum);
   }
   return std::sqrt(hmax(most));
 }
@@ -54,12 +56,12 @@ void RodContacts::look(const Configuration &c, bool all) {
   seen_time_ = time;
   for (int chunk = 0; chunk < chunks(); ++chunk) {
     if (!all && movedSince(c, chunk) <= 0.5 * nearest_[chunk]) continue;
-    const int begin = chunk * chunk_edges, count = edgesOf(chunk) + 1;
+    const int slot = rod_.slot(chunk * chunk_edges), seen = seenOf(chunk), count = edgesOf(chunk) + 1;
     double longest = 0;
-    for (int i = begin; i < begin + count; ++i) {
-      const Vec3 x = c.positionAt(rod_.slot(i));
-      for (int a = 0; a < 3; ++a) seen_[a][i] = x[a];
-      if (i + 1 < begin + count) longest = std::max(longest, c[C::length][rod_.slot(i)]);
+    for (int i = 0; i < count; ++i) {
+      const Vec3 x = c.positionAt(slot + i);
+      for (int a = 0; a < 3; ++a) seen_[a][seen + i] = x[a];
+      if (i + 1 < count) longest = std::max(longest, c[C::length][slot + i]);
     }
     nearest_[chunk] = HUGE_VAL;
     for (const int k : met_) {
@@ -67,7 +69,7 @@ void RodContacts::look(const Configuration &c, bool all) {
       std::array<std::array<double, chunk_edges + 1>, 3> local;
       std::array<double, chunk_edges + 1> distance;
       for (int i = 0; i < count; ++i) {
-        const Vec3 x = pose.toLocal(Vec3(seen_[0][begin + i], seen_[1][begin + i], seen_[2][begin + i]));
+        const Vec3 x = pose.toLocal(Vec3(seen_[0][seen + i], seen_[1][seen + i], seen_[2][seen + i]));
         for (int a = 0; a < 3; ++a) local[a][i] = x[a];
       }
       const double *const points[3] = {local[0].data(), local[1].data(), local[2].data()};
@@ -122,10 +124,10 @@ double RodContacts::smallestGap(const Configuration &c) const {
 double RodContacts::freeFraction(const Configuration &from, const Configuration &to) const {
   constexpr int most_steps = 200;
   constexpr double safety = 0.9, near = 0.2;
-  const double wall = law_.wall();
-  if (!std::isfinite(wall)) return 1;
   double free = 1;
   visitNear(to, &from, [&](const Samples &there) {
+    const double wall = walls_[there.collider];
+    if (!std::isfinite(wall)) return;
     const Samples here = samplesOf(from, there.chunk, there.collider, there.first);
     struct Way {
       Vec3 from, way;
@@ -145,7 +147,7 @@ double RodContacts::freeFraction(const Configuration &from, const Configuration 
       w.way = there.at(k) - w.from;
       w.closing = w.way.norm();
       w.gap = here.distance[k] - wall;
-      w.stop = near * std::min(w.gap, settings_.isBarrier() ? settings_.distance : settings_.radius);
+      w.stop = near * std::min(w.gap, settings_.isBarrier() ? settings_.distance : -wall);
       if (w.gap > w.closing + w.stop) continue;
       w.done = 0;
       if (approaches(&w)) ways[count++] = w;

@@ -1,6 +1,8 @@
 /// The stages of a step in time: their solves, what supports do in them, the error of the step.
 #include "tendril/dynamics/time_loop.hpp"
 
+#include "tendril/solver/hints.hpp"
+
 #include <algorithm>
 
 namespace tendril {
@@ -50,7 +52,8 @@ PetscErrorCode TimeLoop::solveStages(const State &start, State *next, Attempt *n
   if (integrator_->endsAtStage()) PetscFunctionReturn(0);
   if (!potential.moveOn(now->step.time, integrator_->end(start, h, stages_))) {
     now->report.converged = false;
-    now->report.reason = "the end of the step, beyond its last stage, is not a possible configuration";
+    now->report.reason = "the end of the step, beyond its last stage, is not a possible configuration" +
+                         nearObstacle(potential, potential.all());
     PetscFunctionReturn(0);
   }
   finish(start, h, potential.all(), next);

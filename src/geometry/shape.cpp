@@ -31,6 +31,7 @@ public:
   }
   Distance at(const Vec3 &point) const override { return solid_.at(point); }
   double curvatureRadius() const override { return solid_.curvatureRadius(); }
+  double depth() const override { return solid_.depth(); }
   bool isConvex() const override { return solid_.isConvex(); }
 
 private:

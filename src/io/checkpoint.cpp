@@ -142,7 +142,6 @@ void beginAnew(const Simulation &run, State *state, std::vector<std::string> *to
   state->memory.clear();
   state->strains.clear();
   state->support_actions.clear();
-  state->contact_stiffness.clear();
   state->contacts.clear();
   state->last_dt = state->dt_before = 0;
   const Configuration c = configurationOf(*state, run.scene, *run.elements, state->time);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cctype>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
@@ -103,6 +104,7 @@ TriangleMesh readTextStl(const std::string &text, const std::string &path) {
   for (int number = 1; std::getline(file, line); ++number) {
     std::istringstream in(line);
     if (!(in >> word)) continue;
+    std::transform(word.begin(), word.end(), word.begin(), [](unsigned char c) { return char(std::tolower(c)); });
     if (word == "vertex") {
       if (count == 3) fail(path, number, "a facet has three vertices");
       triangle[count++] = pointOf(in, path, number);
@@ -148,7 +150,7 @@ TriangleMesh readMesh(const std::string &path) {
     mesh = readObj(bytes, path);
   else if (bytes.size() >= 84 && bytes.size() == 84 + std::size_t(50) * count)
     mesh = readBinaryStl(bytes, count, path);
-  else if (bytes.size() >= 84 && bytes.compare(0, 5, "solid") != 0)
+  else if (bytes.size() >= 84 && bytes.find('\0') != std::string::npos)
     throw SceneError(path + ": says that it has " + std::to_string(count) + " triangles, in " +
                      std::to_string(84 + std::size_t(50) * count) + " bytes, and has " + std::to_string(bytes.size()) +
                      ": is the file cut off?");

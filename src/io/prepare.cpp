@@ -25,32 +25,52 @@ void requireHeld(const Scene &scene) {
   }
 }
 
-/// Where rods lie in obstacles as drawn.
+} // namespace
+
 void refuseOverlaps(const Simulation &run) {
   const Scene &scene = run.scene;
   const Configuration drawn = configurationOf(run.state, scene, *run.elements, run.state.time);
   for (const Touch &o : tightest(scene, *run.elements, drawn)) {
     const ContactSettings &contact = scene.rods[o.rod].contact;
-    if (o.gap > contact.wall()) continue;
+    const double wall = contact.wall(*scene.colliders[o.collider].shape);
+    if (o.gap > wall) continue;
     throw SceneError("rod '" + scene.rods[o.rod].name + "' lies " + shortText(-o.gap) + " m deep in collider '" +
                      scene.colliders[o.collider].name + "' at its start, at arc length " + shortText(o.arc) +
-                     " m; move one of them by " + shortText(contact.wall() - o.gap + 0.5 * contact.distance) +
-                     " m or more, give the rod a smaller 'contact: {radius: ...}' than " + shortText(contact.radius) +
-                     " m, or write 'contact: none'");
+                     " m; move one of them by " + shortText(wall - o.gap + 0.5 * contact.distance) + " m or more" +
+                     (-o.gap < contact.radius ? ", give the rod a smaller 'contact: {radius: ...}' than " +
+                                                    shortText(contact.radius) + " m,"
+                                              : std::string()) +
+                     " or write 'contact: none'");
   }
 }
 
-/// Of the rods whose edges are long for obstacles that are not much larger than they are thick.
-std::vector<std::string> longEdges(const Simulation &run) {
+namespace {
+
+/// Of rods whose samples lie far apart for obstacles that are not much larger than the rods are thick, and of obstacles
+/// whose coefficients of friction count for nothing.
+std::vector<std::string> notesOnContact(const Simulation &run) {
   constexpr double longest = 20; // radii
   std::vector<std::string> notes;
+  for (const Collider &c : run.scene.colliders)
+    if (c.friction > 0 && !run.scene.slides())
+      notes.push_back("warning: collider '" + c.name + "' has the friction " + shortText(c.friction) +
+                      " and no rod has any: of both the geometric mean counts; write 'contact: {friction: ...}', too");
   for (int r = 0; r < int(run.scene.rods.size()); ++r) {
     const RodRange &rod = run.elements->rods[r];
-    const double radius = run.scene.rods[r].contact.radius, *rest = run.elements->restLength(),
-                 edge = *std::max_element(rest + rod.first_slot, rest + rod.edgeEnd());
-    if (run.scene.touches(r) && radius > 0 && edge >= longest * radius * (1 - 1e-9))
-      notes.push_back("warning: rod '" + run.scene.rods[r].name + "' has edges of up to " + shortText(edge / radius) +
+    const ContactSettings &contact = run.scene.rods[r].contact;
+    const double *const rest = run.elements->restLength(),
+                        edge = *std::max_element(rest + rod.first_slot, rest + rod.edgeEnd());
+    if (!run.scene.touches(r) || contact.radius == 0) continue;
+    if (edge >= longest * contact.radius * (1 - 1e-9))
+      notes.push_back("warning: rod '" + run.scene.rods[r].name + "' has edges of up to " +
+                      shortText(edge / contact.radius) +
                       " of its radii: it may miss obstacles that are smaller; shorter edges feel them");
+    for (const Collider &c : run.scene.colliders)
+      if (const double across = 2 * (c.shape->depth() + contact.radius);
+          contact.quadrature > 0 && edge / contact.quadrature > across)
+        notes.push_back("warning: rod '" + run.scene.rods[r].name + "' touches by points up to " +
+                        shortText(edge / contact.quadrature) + " m apart and may miss collider '" + c.name +
+                        "', with it " + shortText(across) + " m across: take 'quadrature: auto' or shorter edges");
   }
   return notes;
 }
@@ -119,7 +139,7 @@ PetscErrorCode prepare(Prepared &prepared, Options &o) {
   }
   if (!o.rod_edges.empty()) remeshAsAsked(file, o);
   PetscCall(makeReady(std::move(file.scene), o, prepared.run));
-  for (std::string &note : longEdges(*prepared.run)) prepared.notes.push_back(std::move(note));
+  for (std::string &note : notesOnContact(*prepared.run)) prepared.notes.push_back(std::move(note));
   PetscCall(PetscLogStagePop());
   PetscFunctionReturn(0);
 }

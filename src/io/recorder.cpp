@@ -170,7 +170,7 @@ std::string Recorder::tellGrowth(bool finished) {
                     damped = "give the impacts 'contact: {normal_damping: ...}', ";
   std::ostringstream growth;
   growth << "the energy rose by " << std::setprecision(2) << gained_ / moved << " of the largest kinetic energy"
-         << (work > 0 ? " and the work of loads and supports" : "") << " (at most " << passes
+         << (work > 0 ? " and the work done on it" : "") << " (at most " << passes
          << " passes), with nothing to put it in but -integrator " << method
          << " in steps too long for it: shorten -dt, " << (run_.scene.colliders.empty() ? "" : damped)
          << (run_.scene.colliders.empty() ? "or take bdf2 or energy_momentum"

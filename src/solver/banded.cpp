@@ -1,6 +1,7 @@
 #include "tendril/solver/banded.hpp"
 
 #include "tendril/solver/elimination.hpp"
+#include "tendril/solver/substitution.hpp"
 
 #include <petsc/private/matimpl.h>
 

@@ -481,6 +481,28 @@ TEST(Contact, WhatIsDrawnTouchingStays) {
   }
 }
 
+/// So is one that slides along: only what comes at an obstacle has to be stopped by it. And one on two posts, whose
+/// forces act on short pieces.
+TEST(Contact, WhatIsDrawnTouchingIsNotThrownOff) {
+  Scene slides;
+  slides.gravity = Vec3(0, 0, -9.81);
+  slides.rods = {rubber(20, 0.005)};
+  slides.rods[0].initial_velocity = Vec3(2, 0, 0);
+  slides.colliders = {floorAt(0)};
+  Scene lies = slides;
+  lies.rods = {rubber(30, 0.005)};
+  lies.colliders = {obstacle(makeBox(Vec3(0.01, 0.1, 0.1)), Vec3(0.1, 0, -0.05)),
+                    obstacle(makeBox(Vec3(0.01, 0.1, 0.1)), Vec3(0.2, 0, -0.05))};
+  for (const char *method : {"euler", "bdf2", "midpoint"})
+    for (const Scene *scene : {&slides, &lies}) {
+      LoopSettings settings = dynamics(1e-3, 0.1);
+      settings.integrator.name = method;
+      Simulation sim;
+      runTo(sim, *scene, settings);
+      EXPECT_NEAR(sim.state.position[10][2], 0.005, 0.001) << method << (scene == &lies);
+    }
+}
+
 /// Methods that go on beyond their middle take obstacles with them to the end of the step.
 TEST(Contact, StepsEndWithObstaclesAtTheirEnd) {
   for (const char *method : {"euler", "midpoint", "energy_momentum"}) {

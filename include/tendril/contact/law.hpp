@@ -23,8 +23,6 @@ public:
   double stiffness() const { return stiffness_; }
   /// Where it begins to act [m].
   double reach() const { return settings_->isBarrier() ? 0.5 * settings_->distance : settings_->threshold; }
-  /// What no path between two iterates passes [m].
-  double wall() const { return settings_->wall(); }
 
   GapLaw operator()(double distance) const {
     if (!(distance < reach())) return {};

@@ -52,10 +52,10 @@ public:
   /// all of it is free. Conservative advancement (Li et al. 2021, Codimensional incremental potential contact, 4.2).
   double freeFraction(const Configuration &from, const Configuration &to) const;
 
-  /// The obstacle that was nearest to the chunk of a vertex when it was looked at last.
-  int nearestTo(int vertex) const {
-    const auto of_chunk = away_.begin() + std::min(vertex / chunk_edges, chunks() - 1) * int(scene_.colliders.size());
-    return int(std::min_element(of_chunk, of_chunk + int(scene_.colliders.size())) - of_chunk);
+  /// Whether a vertex that goes by so much from where it was looked at last may reach an obstacle.
+  bool mayMeet(int vertex, int collider, double way) const {
+    const int chunk = std::min(vertex / chunk_edges, chunks() - 1);
+    return away_[chunk * int(scene_.colliders.size()) + collider] < way;
   }
   /// Smallest distance of samples from obstacles, between surfaces [m].
   double smallestGap(const Configuration &c) const;
@@ -79,13 +79,15 @@ private:
   NormalLaw law_;
   std::vector<int> met_;                         ///< colliders that are there for the rod
   std::vector<std::vector<SamplePoint>> points_; ///< per collider
+  std::vector<double> walls_;                    ///< per collider: distance that no way passes [m]
   std::vector<double> away_;          ///< per chunk and collider: no sample reaches an obstacle that moves less [m]
   std::vector<double> nearest_;       ///< per chunk: the least of these
-  std::array<AlignedVector, 3> seen_; ///< vertices where they were then [m]
+  std::array<AlignedVector, 3> seen_; ///< vertices of each chunk, with both of its ends, where they were then [m]
   double seen_time_ = 0;              ///< obstacles where they were then [s]
 
   int edgesOf(int chunk) const { return std::min(chunk_edges, rod_.edges - chunk * chunk_edges); }
   int chunks() const { return (rod_.edges + chunk_edges - 1) / chunk_edges; }
+  static int seenOf(int chunk) { return chunk * (chunk_edges + 1); }
   double movedSince(const Configuration &c, int chunk) const;
   Samples samplesOf(const Configuration &c, int chunk, int collider, int first) const;
 };

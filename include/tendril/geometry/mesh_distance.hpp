@@ -4,6 +4,7 @@
 
 #include "tendril/geometry/shape.hpp"
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -79,6 +80,7 @@ public:
   Distance at(const Vec3 &p) const override;
   /// Of the interpolated surface, where `gridError` is measured: about a cell at sharp edges.
   double curvatureRadius() const override { return curvature_radius_; }
+  double depth() const override { return -*std::min_element(spline_.begin(), spline_.end()); }
   /// Largest difference [m] to the exact distance at the centres of cells near the surface. It is largest at edges.
   double gridError() const { return error_; }
   double cell() const { return cell_; } ///< [m]

@@ -24,6 +24,8 @@ public:
   virtual Distance at(const Vec3 &point) const = 0;
   /// Smallest radius of curvature of the surface [m]; infinite where it is flat, zero where it has edges.
   virtual double curvatureRadius() const = 0;
+  /// Largest distance inside [m].
+  virtual double depth() const = 0;
   /// Whether the signed distance is a convex function: nowhere less than its tangents.
   virtual bool isConvex() const { return false; }
 };

@@ -24,6 +24,7 @@ struct HalfSpaceSolid {
   template <class T> T distance(const Vector3<T> &x) const { return x[2]; }
   Distance at(const Vec3 &x) const { return {x[2], Vec3::UnitZ(), Mat3::Zero()}; }
   double curvatureRadius() const { return HUGE_VAL; }
+  double depth() const { return HUGE_VAL; }
   bool isConvex() const { return true; }
 };
 
@@ -39,6 +40,7 @@ struct CapsuleSolid {
   }
   Distance at(const Vec3 &x) const;
   double curvatureRadius() const { return radius; }
+  double depth() const { return radius; }
   bool isConvex() const { return true; }
 };
 
@@ -60,6 +62,7 @@ struct TubeSolid {
   }
   Distance at(const Vec3 &x) const;
   double curvatureRadius() const { return half < HUGE_VAL ? 0 : bore < 0 ? outer : HUGE_VAL; }
+  double depth() const { return std::min(half, bore < 0 ? outer : 0.5 * (outer - bore)); }
   bool isConvex() const { return bore < 0; }
 };
 
@@ -81,6 +84,7 @@ struct BoxSolid {
   }
   Distance at(const Vec3 &x) const;
   double curvatureRadius() const { return 0; }
+  double depth() const { return half.minCoeff(); }
   bool isConvex() const { return true; }
 };
 

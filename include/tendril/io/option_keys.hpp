@@ -103,8 +103,8 @@ inline constexpr Key option_keys[] = {
      "", "64", "rods"},
     {"-contact_distance", KeyType::number, "m", "(of the scene)", "width of the barrier of all rods", positive, "",
      "5e-4", "rods"},
-    {"-contact_friction", KeyType::number, "", "(of the scene)", "coefficient of friction of all rods", not_negative, "",
-     "0.3", "rods"},
+    {"-contact_friction", KeyType::number, "", "(of the scene)", "coefficient of friction of all rods", not_negative,
+     "", "0.3", "rods"},
     {"-error_estimate", KeyType::flag, "", "false",
      "statics: solve again with half the edge length and tell the estimated error; dynamics: tell that in time, where "
      "the integrator leaves it",

@@ -18,6 +18,8 @@ struct Prepared {
 
 /// Reads the scene and sets everything up. \throws SceneError
 PetscErrorCode prepare(Prepared &prepared, Options &options);
+/// \throws SceneError where rods lie in obstacles at the time of their state
+void refuseOverlaps(const Simulation &run);
 /// Chooses the edges, and in dynamics the steps, and makes the scene ready to run with them.
 PetscErrorCode meetAccuracy(Prepared &prepared, Options &options, Choice *choice);
 

@@ -38,9 +38,10 @@ struct ContactSettings {
   int quadrature = 0;      ///< Gauss points of an edge; 0: vertices, and points between where obstacles curve
 
   bool isBarrier() const { return law == Law::barrier; }
-  /// Distance between surfaces that no motion passes [m].
-  double wall() const {
-    return isBarrier() ? -0.5 * distance : radius > 0 ? -0.8 * radius : -std::numeric_limits<double>::infinity();
+  /// Distance from the surface of a shape that no motion passes [m]: of a penalty, short of where the axis of the rod,
+  /// or without a radius the middle of the obstacle, would be passed.
+  double wall(const Shape &shape) const {
+    return isBarrier() ? -0.5 * distance : radius > 0 ? -0.8 * radius : -0.8 * shape.depth();
   }
   bool slides() const { return friction > 0 || tangential_damping > 0 || normal_damping > 0; }
   bool isAnchored(bool is_static) const { return stick == Stick::anchored || (is_static && stick != Stick::creep); }
