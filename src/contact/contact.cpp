@@ -275,8 +275,10 @@ private:
       pressed += force.norm();
     });
     if (pressed == 0) return 1;
-    const double size = resultant.norm(), against = size > 0 ? -load.dot(resultant) / size : 0;
-    return std::clamp((std::max(0.0, against) + stopping) / pressed, least, 1.0);
+    // Where it is wound round an obstacle, its forces cancel and loads press against them from all sides.
+    const double size = resultant.norm(), against = size > 0 ? -load.dot(resultant) / size : 0,
+                 around = load.norm() * (1 - size / pressed);
+    return std::clamp((std::max(around, against) + stopping) / pressed, least, 1.0);
   }
 
   SlidingForce forceOn(const SlidingPoint &point, const Configuration &c, int r) const {
