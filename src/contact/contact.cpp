@@ -45,17 +45,19 @@ Vec3 resultantLoad(const Scene &scene, int r, double length) {
 
 /// Stiffness of the barrier of a rod [N/m]: ten times its weight per length, or where it has more to bear as much as
 /// keeps surfaces within the barrier; a power of four.
-double barrierStiffness(const Scene &scene, const Elements &elements, double force, double pressure, int r) {
+double barrierStiffness(const Scene &scene, const Elements &elements, double force, double pressure, bool is_static,
+                        int r) {
   const Rod &rod = scene.rods[r];
   const double length = elements.length(r);
   double wanted = std::max(force / (20 * rod.contact.radius), 0.1 * pressure);
   if (rod.gravity) wanted = std::max(wanted, 10 * rod.material.linear_density * scene.gravity.norm());
-  // Nothing pulls: what bends it by its own length.
-  if (wanted == 0) {
-    const auto [k1, k2] = rod.material.flexural_stiffness;
-    const double stiffness = std::max({k1, k2, 1e-4 * rod.material.axial_stiffness * length * length});
-    wanted = stiffness / (length * length * length);
-  }
+  // What bends it by its own length: where nothing pulls, and in statics, where supports press it as its bending asks.
+  const auto [k1, k2] = rod.material.flexural_stiffness;
+  const double cube = length * length * length;
+  if (wanted == 0)
+    wanted = std::max({k1, k2, 1e-4 * rod.material.axial_stiffness * length * length}) / cube;
+  else if (is_static)
+    wanted = std::max(wanted, std::sqrt(k1 * k2) / cube);
   return std::pow(4.0, std::ceil(std::log2(wanted) / 2));
 }
 
@@ -244,7 +246,7 @@ private:
         const double stopping =
             step.isStatic() ? 0 : momentumTowards(scene_, elements_, rod, state, step.dt, r) / step.dt;
         force += stopping;
-        stiffness = barrierStiffness(scene_, elements_, force, pressure, r);
+        stiffness = barrierStiffness(scene_, elements_, force, pressure, step.isStatic(), r);
         if (!step.isStatic() && before == 0) { // what is drawn touching is not thrown off
           rod.setStiffness(stiffness);
           stiffness *= partBorne(rod, start, resultantLoad(scene_, r, length), stopping);
