@@ -3,7 +3,7 @@
 
 All scenes that are shipped are valid by both; 200 mutations of them (a key taken away, misspelt, repeated elsewhere, of
 another type, out of its bounds, a second shape) are taken or refused by both alike. What a schema cannot know is left
-alone: contents of files, names of rods, numbers of vertices, and what is normal to what.
+alone: contents of files, names of rods, numbers of vertices, what is normal to what, larger than what, and within what.
 """
 import copy
 import json
@@ -78,7 +78,7 @@ def mutate(scene, rng):
 READER_ONLY = ("cannot be opened", "must not be zero", "normal to", "not normal", "out of range", "there is no rod", "which 'rod'", "held twice",
                "zero length", "folds back", "too short", "never reaches", "parallel", "must not be empty, a number", "there is a rod", "whole number, or its ends",
                "has no twist", "cannot carry", "no twist to fix", "must increase", "contradicts", "free to move as a whole", "pin holds",
-               "holds no position", "comes out as", "is for -mode static")
+               "holds no position", "comes out as", "is for -mode static", "deep in collider", "must not exceed its radius", "must be larger than 'bore'")
 
 
 def reads(scene, folder, name):
