@@ -56,21 +56,22 @@ std::vector<std::string> notesOnContact(const Simulation &run) {
       notes.push_back("warning: collider '" + c.name + "' has the friction " + shortText(c.friction) +
                       " and no rod has any: of both the geometric mean counts; write 'contact: {friction: ...}', too");
   for (int r = 0; r < int(run.scene.rods.size()); ++r) {
-    const RodRange &rod = run.elements->rods[r];
     const ContactSettings &contact = run.scene.rods[r].contact;
-    const double *const rest = run.elements->restLength(),
-                        edge = *std::max_element(rest + rod.first_slot, rest + rod.edgeEnd());
     if (!run.scene.touches(r) || contact.radius == 0) continue;
+    const RodRange &rod = run.elements->rods[r];
+    const double *const rest = run.elements->restLength();
+    const double edge = *std::max_element(rest + rod.first_slot, rest + rod.edgeEnd());
     if (edge >= longest * contact.radius * (1 - 1e-9))
       notes.push_back("warning: rod '" + run.scene.rods[r].name + "' has edges of up to " +
                       shortText(edge / contact.radius) +
                       " of its radii: it may miss obstacles that are smaller; shorter edges feel them");
+    if (contact.quadrature == 0) continue;
+    const double apart = edge / contact.quadrature;
     for (const Collider &c : run.scene.colliders)
-      if (const double across = 2 * (c.shape->depth() + contact.radius);
-          contact.quadrature > 0 && edge / contact.quadrature > across)
-        notes.push_back("warning: rod '" + run.scene.rods[r].name + "' touches by points up to " +
-                        shortText(edge / contact.quadrature) + " m apart and may miss collider '" + c.name +
-                        "', with it " + shortText(across) + " m across: take 'quadrature: auto' or shorter edges");
+      if (const double across = 2 * (c.shape->depth() + contact.radius); apart > across)
+        notes.push_back("warning: rod '" + run.scene.rods[r].name + "' touches by points up to " + shortText(apart) +
+                        " m apart and may miss collider '" + c.name + "', with it " + shortText(across) +
+                        " m across: take 'quadrature: auto' or shorter edges");
   }
   return notes;
 }

@@ -29,18 +29,21 @@ namespace {
 /// Kinetic energy of a state, of each vertex at most what it has relative to the obstacles that move [J]: what one of
 /// them takes along is its to give.
 double kineticBesideObstacles(const Simulation &run, const State &state, double kinetic) {
-  for (std::size_t r = 0; r < run.elements->rods.size(); ++r) {
+  struct Carried {
+    Vec3 about, velocity, spin;
+  };
+  std::vector<Carried> moving;
+  for (const Collider &c : run.scene.colliders)
+    if (c.motion.moves())
+      moving.push_back(
+          {c.poseAt(state.time).position, c.motion.velocityAt(state.time), c.motion.angularVelocityAt(state.time)});
+  for (std::size_t r = 0; r < run.elements->rods.size() && !moving.empty(); ++r) {
     const RodRange &rod = run.elements->rods[r];
     for (int i = 0; i < rod.vertices; ++i) {
-      const int vertex = rod.first_vertex + i;
-      const Vec3 &x = state.position[vertex], &v = state.velocity[vertex];
+      const Vec3 &x = state.position[rod.first_vertex + i], &v = state.velocity[rod.first_vertex + i];
       double least = v.squaredNorm();
-      for (const Collider &c : run.scene.colliders) {
-        if (!c.motion.moves()) continue;
-        const Vec3 arm = x - c.poseAt(state.time).position;
-        const Vec3 carried = c.motion.velocityAt(state.time) + c.motion.angularVelocityAt(state.time).cross(arm);
-        least = std::min(least, (v - carried).squaredNorm());
-      }
+      for (const Carried &c : moving)
+        least = std::min(least, (v - c.velocity - c.spin.cross(x - c.about)).squaredNorm());
       kinetic -= 0.5 * run.elements->mass()[rod.slot(i)] * (v.squaredNorm() - least);
     }
   }
@@ -72,9 +75,7 @@ PetscErrorCode Recorder::observe(const State &state, const Diagnostics &row) {
   dissipated_ += row.dissipated;
   work_ += std::abs(row.work.loads + row.work.supports);
   work_of_obstacles_ += std::abs(row.work.obstacles);
-  most_kinetic_ =
-      std::max(most_kinetic_, run_.scene.collidersMove() ? kineticBesideObstacles(run_, state, row.energy.kinetic)
-                                                         : row.energy.kinetic);
+  most_kinetic_ = std::max(most_kinetic_, kineticBesideObstacles(run_, state, row.energy.kinetic));
   const double stored = row.energy.total() - row.energy.kinetic;
   if (std::isnan(first_stored_)) first_stored_ = stored;
   most_stored_ = std::max(most_stored_, std::abs(stored - first_stored_));
@@ -166,17 +167,17 @@ std::string Recorder::tellGrowth(bool finished) {
   const double work = work_ + std::min(work_of_obstacles_, most_stored_), moved = most_kinetic_ + work,
                little = smallEnergy(run_);
   if (!options_.loop.dynamic || !(gained_ > told * moved + little)) return {};
-  const std::string &method = options_.loop.integrator.name,
-                    damped = "give the impacts 'contact: {normal_damping: ...}', ";
+  const std::string &method = options_.loop.integrator.name;
+  std::string remedy = "or take bdf2 or energy_momentum";
+  if (!run_.scene.colliders.empty())
+    remedy = std::string("give the impacts 'contact: {normal_damping: ...}', ") +
+             (method == "euler" ? "or fix 'contact: {stiffness: ...}'" : "or take euler");
   std::ostringstream growth;
   growth << "the energy rose by " << std::setprecision(2) << gained_ / moved << " of the largest kinetic energy"
          << (work > 0 ? " and the work done on it" : "") << " (at most " << passes
          << " passes), with nothing to put it in but -integrator " << method
-         << " in steps too long for it: shorten -dt, " << (run_.scene.colliders.empty() ? "" : damped)
-         << (run_.scene.colliders.empty() ? "or take bdf2 or energy_momentum"
-             : method == "euler"          ? "or fix 'contact: {stiffness: ...}'"
-                                          : "or take euler")
-         << "; " << labelOf(run_.scene.rods[liveliest(run_)]) << " moves most";
+         << " in steps too long for it: shorten -dt, " << remedy << "; " << labelOf(run_.scene.rods[liveliest(run_)])
+         << " moves most";
   // A method that is unstable has made most of the motion itself.
   if (finished && gained_ > passes * moved + little) return growth.str();
   progress_.say("warning: " + growth.str());
