@@ -122,6 +122,18 @@ public:
     });
     for (const SlidingPoint &point : sliding_[r].points) addSliding(point, forceOn(point, c, r), c, wanted, out);
   }
+  std::array<double, 2> pressure(const Configuration &c, const Planes &increment, int r) const override {
+    std::array<double, 2> sum{0, 0};
+    if (!of_[r]) return sum;
+    const RodContacts &rod = *of_[r];
+    rod.visitTouching(c, rod.law(), [&](const Samples &samples, int k) {
+      const ContactPoint point = contactPoint(scene_, rod, samples, k);
+      const Vec3 from = increment.vector(0, samples.slot[k]), to = increment.vector(0, samples.slot[k] + 1);
+      sum[0] += point.force.norm();
+      sum[1] += (point.stiffness * ((1 - point.at) * from + point.at * to)).norm();
+    });
+    return sum;
+  }
   void addObstacleMotion(const Configuration &c, double time, int r, Planes &out) const override {
     if (!of_[r]) return;
     const RodContacts &rod = *of_[r];

@@ -125,6 +125,16 @@ double IncrementalPotential::smallestGap(RodSet rods) const {
   return gap;
 }
 
+double IncrementalPotential::changeOfPressure(int r, const Planes &increment) const {
+  double force = scales_[r].force, change = 0;
+  for (const auto &term : terms_) {
+    const auto [pressing, changing] = term->pressure(iterate_, increment, r);
+    force = std::max(force, pressing);
+    change += changing;
+  }
+  return change / force;
+}
+
 double IncrementalPotential::energy(const Configuration &configuration, RodSet rods) const {
   double sum = 0;
   for (int r = rods.begin; r < rods.end; ++r) sum += rodEnergy(configuration, r).value;

@@ -70,12 +70,14 @@ PetscErrorCode NewtonSolver::findLoadReach() {
 }
 
 /// Whether the last increment of a rod is little: against what the step or its loads move, in displacement and in
-/// energy; or against the rounding of the coordinates, for a rod at rest. `size`: of the increment.
+/// energy; or against the rounding of the coordinates, for a rod at rest. What presses on it must hardly change: a
+/// barrier that is nearly closed turns little motions into forces. `size`: of the increment.
 bool NewtonSolver::isLittle(int r, double *size) {
   const double tolerance = potential_->settings.rounding_tolerance;
   const IncrementalPotential::RodEnergy &energy = energyAtIterate(r);
   const double cost = std::abs(work_->standstill[r].energy);
   *size = sizeOf(r, work_->increment);
+  if (potential_->scene().touches(r) && !(potential_->changeOfPressure(r, work_->increment) <= tolerance)) return false;
   if (*size <= 256 * epsilon * std::max(1.0, energy.reach / potential_->length(r)))
     return true; // soft turns carry the rounding of many edges
   if (*size <= tolerance * movedBy(r) && cost <= tolerance * tolerance * energy.size) return true;

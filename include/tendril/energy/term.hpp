@@ -84,6 +84,12 @@ public:
   }
   /// Smallest distance between the surfaces of a rod and of obstacles [m]; infinite where there are none.
   virtual double smallestGap(const Configuration & /*configuration*/, int /*rod*/) const { return HUGE_VAL; }
+  /// Sum over a rod's samples in contact of the force that presses on each, and of by how much a small motion changes
+  /// it, to first order [N].
+  virtual std::array<double, 2> pressure(const Configuration & /*configuration*/, const Planes & /*increment*/,
+                                         int /*rod*/) const {
+    return {0, 0};
+  }
   /// Adds by how much its gradient changes when obstacles go on to a time and the rod stays, to first order.
   virtual void addObstacleMotion(const Configuration & /*iterate*/, double /*time*/, int /*rod*/,
                                  Planes & /*out*/) const {}

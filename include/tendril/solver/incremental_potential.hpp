@@ -113,6 +113,9 @@ public:
   void addObstacleMotion(int rod, Planes &out) const {
     for (const auto &term : terms_) term->addObstacleMotion(iterate_, nextObstacleTime(rod), rod, out);
   }
+  /// By how much a small motion changes the forces that obstacles press on a rod with, over those forces or the loads,
+  /// to first order; 0 where nothing touches.
+  double changeOfPressure(int rod, const Planes &increment) const;
   /// Up to when they can go in one move.
   double nextObstacleTime(int rod) const { return scene_.collidersEvenUntil(iterate_.obstacleTime(rod), step_.time); }
   /// Whether obstacles have not reached their places at the end of the step.
