@@ -56,6 +56,7 @@ State prolonged(const State &state, const Scene &scene, const Elements &elements
   State out;
   out.time = state.time;
   out.step = state.step;
+  out.junction_axes = state.junction_axes;
   const Configuration c = configurationOf(state, scene, elements, state.time);
   std::vector<TwistRates> rates;
   for (int r = 0; r < int(scene.rods.size()); ++r) {

@@ -93,6 +93,8 @@ Frame RodAccess::frameAt(const State &state, int slot) const {
   if (const int edge = edgeAt(range_, slot); edge >= 0) return edgeFrame(state, edge);
   for (const Support *s : supports_)
     if (elements_.support_slot[s - scene_.supports.data()] == slot) return supportFrame(*s, state.time);
+  for (const JoinedEdge &j : elements_.joinedEdges({index_, index_ + 1}))
+    if (j.frame == slot) return joinedFrame(state, elements_, j);
   throw std::logic_error("a cell joins a frame that nothing has");
 }
 
@@ -115,7 +117,7 @@ std::vector<double> RodAccess::atVertices(const std::vector<double> &cell_twists
   for (std::size_t n = 0; n < cells_.size(); ++n) {
     const int v = vertexOf(cells_[n]);
     const bool whole = edgeAt(range_, cells_[n].frame0) >= 0 && edgeAt(range_, cells_[n].frame1) >= 0;
-    if (!whole || !holds(v, &Support::holdsTwist)) twists[v] += cell_twists[n];
+    if (!whole || !holds(v, &Support::holdsTwist)) twists[v] += cell_twists[n]; // of a junction, both half cells
   }
   return twists;
 }

@@ -1,4 +1,5 @@
 /// Bending and twisting of all cells, several at a time in the lanes of a pack.
+#include "tendril/energy/joint_cell.hpp"
 #include "tendril/energy/term.hpp"
 
 namespace tendril {
@@ -113,6 +114,28 @@ private:
     void putGradient(int, const T &) const {}
   };
 
+  /// A half cell to the frame of a junction.
+  /// \param blocks null where only the gradient is wanted \param gradient or only the Hessian
+  template <Measure measure>
+  [[gnu::noinline]] void addJoined(const Configuration &c, const LooseCell &cell, const CellOf<double> &constants,
+                                   const std::array<double *, slot_size> *gradient, const BlockPlanes *blocks) const {
+    const int frame = cell.turning == 0 ? cell.frame0 : cell.frame1, edge = cell.turning == 0 ? cell.frame1 : cell.frame0;
+    const JointCellDerivatives d =
+        jointCellDerivatives<measure>(c.frameAt(cell.frame0), c.frameAt(cell.frame1), constants, cell.turning);
+    for (int r = 0; gradient && r < 3; ++r) {
+      (*gradient)[r][frame] += d.spin[r];
+      (*gradient)[r][edge] -= d.edge[r];
+      (*gradient)[r][edge + 1] += d.edge[r];
+    }
+    if (gradient) (*gradient)[3][edge] += d.edge[3];
+    for (int r = 0; blocks && r < edge_size; ++r)
+      for (int k = 0; k < edge_size; ++k) {
+        if (k >= r) blocks->own(r, k)[edge] += d.edge_edge(r, k);
+        if (r < 3) blocks->across(r, k)[cell.slot] += d.spin_edge(r, k);
+        if (r <= k && k < 3) blocks->vertex(r, k)[frame] += d.spin_spin(r, k);
+      }
+  }
+
   template <Measure measure>
   void assemble(const Configuration &configuration, int rod, HessianKind hessian, Derivatives &out) const {
     std::array<double *, slot_size> gradient;
@@ -131,6 +154,9 @@ private:
   [[gnu::flatten, gnu::noinline]] void addGradients(const Configuration &c, int rod,
                                                     const std::array<double *, slot_size> &gradient) const {
     forCells(elements_, rod, [&]<class T>(const LooseCell &cell, int count) {
+      if constexpr (std::is_same_v<T, double>)
+        if (cell.turning >= 0)
+          return addJoined<measure>(c, cell, cellOf<double>(cells_, c, cell.slot), &gradient, nullptr);
       const auto f = cellFrames<T>(c, cell, count);
       const std::array<T, cell_size> g = cellGradient<measure>(f[0], f[1], cellOf<T>(cells_, c, cell.slot));
       for (int r = 0; r < cell_size; ++r) addTo(gradient[r % slot_size] + cell.vertex - 1 + r / slot_size, g[r]);
@@ -142,6 +168,9 @@ private:
                                               const std::array<double *, slot_size> &gradient,
                                               const BlockPlanes &blocks) const {
     forCells(elements_, rod, [&]<class T>(const LooseCell &cell, int count) {
+      if constexpr (std::is_same_v<T, double>)
+        if (cell.turning >= 0)
+          return addJoined<measure>(c, cell, cellOf<double>(cells_, c, cell.slot), &gradient, &blocks);
       const auto f = cellFrames<T>(c, cell, count);
       cellDerivatives<measure>(f[0], f[1], cellOf<T>(cells_, c, cell.slot),
                                Adder<T>{gradient, blocks, cell.vertex - 1});
@@ -157,6 +186,8 @@ private:
       const auto f = cellFrames<T>(c, cell, count);
       CellOf<T> constants = cellOf<T>(cells_, c, cell.slot);
       constants.rest = cellStrain<measure>(f[0], f[1], constants);
+      if constexpr (std::is_same_v<T, double>)
+        if (cell.turning >= 0) return addJoined<measure>(c, cell, constants, nullptr, &blocks);
       cellDerivatives<measure>(f[0], f[1], constants, HessianAdder<T>{{gradient, blocks, cell.vertex - 1}});
     });
   }

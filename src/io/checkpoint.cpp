@@ -104,6 +104,10 @@ template <class Archive, class AnyContents> void exchange(Archive &a, AnyContent
   a.array("contact_stiffness", s.contact_stiffness, stiffness);
   if (a.format_version < 5) return;
   exchangeContacts(a, s, whole);
+  if (a.format_version < 6) return;
+  std::size_t groups = s.junction_axes.size();
+  whole("junction_groups", groups, 1e15);
+  a.array("junction_axes", s.junction_axes, groups);
 }
 
 /// Whole turns of cells that were others in the checkpoint: the twist of a vertex along the rod stays what it was, by
@@ -321,6 +325,7 @@ void adapt(Found *f, const std::vector<double> &places, const Simulation &run, c
   const std::size_t rods = run.elements->rods.size();
   if (s.contact_stiffness.size() < rods) s.contact_stiffness.clear();
   if (s.contacts.size() != rods) s.contacts.clear();
+  s.junction_axes.resize(run.elements->groups, {Vec3::UnitX(), Vec3::UnitY()});
   if (!f->same_method) {
     s.memory.clear();
     s.strains.clear();

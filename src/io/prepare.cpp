@@ -11,18 +11,28 @@
 namespace tendril {
 namespace {
 
-/// A rod that nothing holds has no equilibrium to find.
+/// A rod that nothing holds, itself or by what junctions join it to, has no equilibrium to find.
 void requireHeld(const Scene &scene) {
-  for (std::size_t r = 0; r < scene.rods.size(); ++r) {
-    const bool held = std::any_of(scene.supports.begin(), scene.supports.end(),
-                                  [&](const Support &s) { return s.rod == int(r) && s.holdsPosition(); }) ||
-                      std::any_of(scene.constraints.begin(), scene.constraints.end(),
-                                  [&](const Constraint &c) { return c.rod == int(r) && c.isPin() && c.stiffness > 0; });
-    if (!held && !scene.touches(int(r))) // what obstacles hold shows
-      throw SceneError(
-          "rod '" + scene.rods[r].name +
-          "' is free to move as a whole: -mode static needs a clamp, pins or constraints that hold every rod");
-  }
+  std::vector<int> first(scene.rods.size()); // of the rods that are joined
+  for (int r = 0; r < int(first.size()); ++r) first[r] = r;
+  auto rootOf = [&](int r) {
+    while (first[r] != r) r = first[r] = first[first[r]];
+    return r;
+  };
+  for (const Junction &j : scene.junctions)
+    for (const Junction::Member &m : j.members) first[rootOf(m.rod)] = rootOf(j.members.front().rod);
+  std::vector<char> held(scene.rods.size(), false);
+  for (const Support &s : scene.supports)
+    if (s.holdsPosition()) held[rootOf(s.rod)] = true;
+  for (const Constraint &c : scene.constraints)
+    if (c.isPin() && c.stiffness > 0) held[rootOf(c.rod)] = true;
+  for (int r = 0; r < int(scene.rods.size()); ++r)
+    if (scene.touches(r)) held[rootOf(r)] = true; // what obstacles hold shows
+  for (int r = 0; r < int(scene.rods.size()); ++r)
+    if (!held[rootOf(r)])
+      throw SceneError("rod '" + scene.rods[r].name +
+                       "' is free to move as a whole: -mode static needs a clamp, pins or constraints that hold every "
+                       "rod, or one that it is joined to");
 }
 
 } // namespace

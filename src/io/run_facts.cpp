@@ -208,6 +208,11 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
     shape.add(rod.natural == Rod::Natural::given ? textOf(rod.natural_strain) : "");
     add(Kind::scene, "shape at rest" + of, "#" + shape.hex());
   }
+  for (const Junction &j : scene.junctions)
+    for (const Junction::Member &m : j.members) {
+      const int what[] = {int(&j - scene.junctions.data()), m.rod, m.vertex, m.group};
+      topology.add(what, sizeof what);
+    }
   topology_hash = topology.hex();
   std::sort(names.begin(), names.end());
   for (const std::string &name : names) set.add(name + "\n");

@@ -1,6 +1,7 @@
 #include "tendril/io/scene_reader.hpp"
 
 #include "tendril/io/collider_reader.hpp"
+#include "tendril/io/junction_reader.hpp"
 #include "tendril/io/polyline_reader.hpp"
 #include "tendril/io/support_reader.hpp"
 #include "tendril/io/text.hpp"
@@ -299,6 +300,8 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
     for (const YamlValue &v : map.at("supports").items()) readSupport(v, out);
   if (map.has("constraints"))
     for (const YamlValue &v : map.at("constraints").items()) readConstraint(v, out);
+  if (map.has("junctions"))
+    for (const YamlValue &v : map.at("junctions").items()) readJunction(v, out);
   if (map.has("loads"))
     for (const YamlValue &v : map.at("loads").items()) readLoad(v, out);
   if (map.has("colliders")) {

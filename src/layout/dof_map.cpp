@@ -3,6 +3,7 @@
 #include <petscdmshell.h>
 
 #include <algorithm>
+#include <unordered_map>
 
 namespace tendril {
 namespace {
@@ -33,25 +34,34 @@ PetscErrorCode createLocalVector(DM dm, Vec *v) {
 
 } // namespace
 
-/// Section over the points v0, e0, v1, e1, ... of every rod; the last vertex of an open rod has no edge after it.
+/// Section over the points v0, e0, v1, e1, ... of every rod, with the frames of junctions that it has behind; the last
+/// vertex of an open rod has no edge after it.
 PetscErrorCode DofMap::createSection(PetscSection *section) const {
   PetscFunctionBeginUser;
   PetscInt points = 0;
   for (const RodRange &r : rods_) points += r.vertices + r.edges;
+  for (const JoinedEdge &j : joined_edges_.items) points += j.isFirst();
   PetscCall(PetscSectionCreate(PETSC_COMM_WORLD, section));
-  PetscCall(PetscSectionSetNumFields(*section, 2));
+  PetscCall(PetscSectionSetNumFields(*section, groups_ == 0 ? 2 : 3));
   PetscCall(PetscSectionSetFieldName(*section, 0, "position"));
   PetscCall(PetscSectionSetFieldComponents(*section, 0, 3));
   PetscCall(PetscSectionSetFieldName(*section, 1, "twist"));
   PetscCall(PetscSectionSetFieldComponents(*section, 1, 1));
+  if (groups_ > 0) {
+    PetscCall(PetscSectionSetFieldName(*section, 2, "rotation"));
+    PetscCall(PetscSectionSetFieldComponents(*section, 2, 3));
+  }
   PetscCall(PetscSectionSetChart(*section, 0, points));
   PetscInt point = 0;
-  for (std::size_t r = 0; r < rods_.size(); ++r)
+  std::vector<bool> fixed = held_;
+  for (const JoinedVertex &j : joined_vertices_.items)
+    if (j.isCopy()) fixed[rods_[j.rod].first_vertex + j.vertex] = true;
+  for (int r = 0; r < int(rods_.size()); ++r) {
     for (int i = 0; i < rods_[r].vertices; ++i) {
       const PetscInt vertex = point++;
       PetscCall(PetscSectionSetDof(*section, vertex, 3));
       PetscCall(PetscSectionSetFieldDof(*section, vertex, 0, 3));
-      if (held_[rods_[r].first_vertex + i]) {
+      if (fixed[rods_[r].first_vertex + i]) {
         PetscCall(PetscSectionSetConstraintDof(*section, vertex, 3));
         PetscCall(PetscSectionSetFieldConstraintDof(*section, vertex, 0, 3));
       }
@@ -61,6 +71,12 @@ PetscErrorCode DofMap::createSection(PetscSection *section) const {
       PetscCall(PetscSectionSetDof(*section, edge, 1));
       PetscCall(PetscSectionSetFieldDof(*section, edge, 1, 1));
     }
+    for (const JoinedEdge &j : joinedEdges({r, r + 1})) {
+      if (!j.isFirst()) continue;
+      PetscCall(PetscSectionSetDof(*section, point, 3));
+      PetscCall(PetscSectionSetFieldDof(*section, point++, 2, 3));
+    }
+  }
   PetscCall(PetscSectionSetUp(*section));
   const PetscInt all[3] = {0, 1, 2};
   for (PetscInt p = 0; p < points; ++p) {
@@ -83,6 +99,9 @@ PetscErrorCode DofMap::setUp(const Scene &scene) {
     if (scene.rods[s.rod].edgeBefore(s.vertex) >= 0 && scene.rods[s.rod].edgeAfter(s.vertex) >= 0)
       along[s.rod] += 3; // a frame and two cells
   for (const Constraint &c : scene.constraints) along[c.rod] += c.slots();
+  const std::vector<int> before_junctions = along;
+  for (const Junction &j : scene.junctions)
+    for (const Junction::Member &m : j.members) along[m.rod] += 4; // frames and half cells of two edges
   slots_ = lanes; // room for the frame before the first rod
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
     const Rod &rod = scene.rods[r];
@@ -98,6 +117,9 @@ PetscErrorCode DofMap::setUp(const Scene &scene) {
   held_.assign(vertices_, false);
   for (const Support &s : scene.supports)
     if (s.holdsPosition()) held_[rods_[s.rod].first_vertex + s.vertex] = true;
+  unknown_end_.clear();
+  for (const RodRange &rod : rods_) unknown_end_.push_back(rod.vertexEnd());
+  if (!scene.junctions.empty()) join(scene, before_junctions);
 
   OwnedSection section;
   PetscCall(createSection(section.out()));
@@ -111,13 +133,17 @@ PetscErrorCode DofMap::setUp(const Scene &scene) {
 
   unknown_.assign(std::size_t(slots_) * slot_size, -1);
   PetscInt point = 0, next = 0;
-  for (const RodRange &rod : rods_) {
+  std::vector<bool> fixed = held_;
+  for (const JoinedVertex &j : joined_vertices_.items)
+    if (j.isCopy()) fixed[rods_[j.rod].first_vertex + j.vertex] = true;
+  for (int r = 0; r < int(rods_.size()); ++r) {
+    const RodRange &rod = rods_[r];
     unknown_begin_.push_back(next);
     for (int i = 0; i < rod.vertices; ++i) {
       PetscInt *here = &unknown_[std::size_t(slot_size) * rod.slot(i)];
       PetscInt offset;
       PetscCall(PetscSectionGetOffset(global, point++, &offset));
-      if (!held_[rod.first_vertex + i])
+      if (!fixed[rod.first_vertex + i])
         for (int a = 0; a < 3; ++a) here[a] = offset + a;
       if (i == rod.edges) continue;
       if (rod.twist) {
@@ -126,12 +152,61 @@ PetscErrorCode DofMap::setUp(const Scene &scene) {
       }
       ++point;
     }
+    for (const JoinedEdge &j : joinedEdges({r, r + 1})) {
+      if (!j.isFirst()) continue;
+      PetscInt offset;
+      PetscCall(PetscSectionGetOffset(global, point++, &offset));
+      for (int a = 0; a < 3; ++a) unknown_[std::size_t(slot_size) * j.frame + a] = offset + a;
+    }
     for (PetscInt *u = &unknown_[std::size_t(slot_size) * rod.first_slot];
-         u < &unknown_[std::size_t(slot_size) * rod.vertexEnd()]; ++u)
+         u < &unknown_[std::size_t(slot_size) * unknown_end_[r]]; ++u)
       if (*u >= 0) PetscCheck(*u == next++, PETSC_COMM_SELF, PETSC_ERR_PLIB, "unknowns must follow the slots");
   }
   unknown_begin_.push_back(next);
   PetscFunctionReturn(0);
+}
+
+/// What junctions make of vertices and edges, and the islands. A vertex that a support holds holds the others with it.
+void DofMap::join(const Scene &scene, std::vector<int> free_slots) {
+  joined_vertices_ = {};
+  joined_edges_ = {};
+  groups_ = 0;
+  islands_.clear();
+  for (int r = 0; r < int(rods_.size()); ++r) islands_.push_back({r, r + 1});
+  for (int k = 0; k < int(scene.junctions.size()); ++k) {
+    const Junction &junction = scene.junctions[k];
+    auto isHeldMember = [&](const Junction::Member &m) { return held_[rods_[m.rod].first_vertex + m.vertex]; };
+    const auto holder = std::find_if(junction.members.begin(), junction.members.end(), isHeldMember);
+    const bool held = holder != junction.members.end();
+    const Junction::Member &first = held ? *holder : junction.members.front(); // supports that move, move it
+    std::vector<int> first_frame(junction.groups, -1);
+    RodSet island = islands_[first.rod];
+    for (const Junction::Member &m : junction.members) {
+      const RodRange &range = rods_[m.rod];
+      const Rod &rod = scene.rods[m.rod];
+      joined_vertices_.items.push_back(
+          {m.rod, m.vertex, range.slot(m.vertex), rods_[first.rod].slot(first.vertex), k});
+      island = {std::min(island.begin, islands_[m.rod].begin), std::max(island.end, islands_[m.rod].end)};
+      if (m.group < 0 || !range.twist) continue;
+      for (const bool ends : {true, false}) {
+        const int edge = ends ? rod.edgeBefore(m.vertex) : rod.edgeAfter(m.vertex);
+        if (edge < 0) continue;
+        const int frame = range.looseSlot() + free_slots[m.rod]++, cell = range.looseSlot() + free_slots[m.rod]++;
+        int &of_group = first_frame[m.group];
+        if (of_group < 0) {
+          of_group = frame;
+          unknown_end_[m.rod] = std::max(unknown_end_[m.rod], frame + 1);
+        }
+        joined_edges_.items.push_back({m.rod, edge, m.vertex, cell, frame, of_group, groups_ + m.group, ends});
+      }
+    }
+    for (const Junction::Member &m : junction.members)
+      if (held) held_[rods_[m.rod].first_vertex + m.vertex] = true;
+    groups_ += junction.groups;
+    for (int r = island.begin; r < island.end; ++r) islands_[r] = island;
+  }
+  joined_vertices_.sort(rods_.size());
+  joined_edges_.sort(rods_.size());
 }
 
 namespace {
@@ -144,23 +219,33 @@ struct Part {
 
 } // namespace
 
-PetscErrorCode DofMap::createMatrix(Mat *matrix, bool joins) {
+PetscErrorCode DofMap::createMatrix(RodSet rods, bool joins, Mat *matrix, Pattern *pattern) const {
   PetscFunctionBeginUser;
   std::vector<PetscInt> row, column;
-  source_.clear();
-  EdgeBlocks blocks(0, joins); // its window is that of all rods, which begins with the first
-  blocks.setOrigin(rods_.front().first_slot);
-  for (const RodRange &rod : rods_) {
+  std::vector<std::ptrdiff_t> &source_of = pattern->source;
+  source_of.clear();
+  EdgeBlocks blocks(0, joins); // for its window
+  blocks.setOrigin(rods_[rods.begin].first_slot);
+  const PetscInt first = firstUnknown(rods);
+  std::unordered_map<int, int> copies; // slot of what they stand for
+  for (const JoinedVertex &j : joinedVertices(rods)) copies[j.slot] = j.first_slot;
+  for (const JoinedEdge &j : joinedEdges(rods)) copies[j.frame] = j.first_frame;
+  auto shared = [&](int slot, int a) {
+    const auto found = copies.find(slot);
+    return unknown(found == copies.end() ? slot : found->second, a);
+  };
+  for (int r = rods.begin; r < rods.end; ++r) {
+    const RodRange &rod = rods_[r];
     auto slot = [&](int i) { return rod.slot(rod.closed ? i % rod.vertices : i); };
     auto edge = [&](int i, int r) {
       std::vector<Part> parts;
       if (r == 3)
         parts = {{unknown(slot(i), 3), false}};
       else
-        parts = {{unknown(slot(i), r), true}, {unknown(slot(i + 1), r), false}};
+        parts = {{shared(slot(i), r), true}, {shared(slot(i + 1), r), false}};
       return parts;
     };
-    auto position = [&](int i, int r) { return std::vector<Part>{{unknown(slot(i), r), false}}; };
+    auto position = [&](int i, int r) { return std::vector<Part>{{shared(slot(i), r), false}}; };
     auto couple = [&](const std::vector<Part> &left, const std::vector<Part> &right, int plane, int i, bool once) {
       const std::ptrdiff_t source = std::ptrdiff_t(blocks.offset(rod, plane)) + i;
       for (const Part &a : left)
@@ -168,9 +253,9 @@ PetscErrorCode DofMap::createMatrix(Mat *matrix, bool joins) {
           if (a.unknown < 0 || b.unknown < 0) continue;
           for (const bool mirrored : {false, true}) {
             if (mirrored && once) continue;
-            row.push_back(mirrored ? b.unknown : a.unknown);
-            column.push_back(mirrored ? a.unknown : b.unknown);
-            source_.push_back(a.minus == b.minus ? source : ~source);
+            row.push_back((mirrored ? b.unknown : a.unknown) - first);
+            column.push_back((mirrored ? a.unknown : b.unknown) - first);
+            source_of.push_back(a.minus == b.minus ? source : ~source);
           }
         }
     };
@@ -186,23 +271,35 @@ PetscErrorCode DofMap::createMatrix(Mat *matrix, bool joins) {
     for (int i = 0; i < rod.vertices; ++i)
       for (int r = 0; r < 3; ++r)
         for (int c = r; c < 3; ++c) couple(position(i, r), position(i, c), EdgeBlocks::vertex(r, c), i, r == c);
+    for (const JoinedEdge &j : joinedEdges({r, r + 1})) {
+      auto spin = [&](int a) { return std::vector<Part>{{shared(j.frame, a), false}}; };
+      for (int a = 0; a < 3; ++a) {
+        for (int c = a; c < 3; ++c)
+          couple(spin(a), spin(c), EdgeBlocks::vertex(a, c), j.frame - rod.first_slot, a == c);
+        for (int c = 0; c < edge_size; ++c)
+          couple(spin(a), edge(j.edge, c), EdgeBlocks::across(a, c), j.cell - rod.first_slot, false);
+      }
+    }
   }
-  PetscCall(MatCreate(PETSC_COMM_WORLD, matrix));
-  PetscCall(MatSetSizes(*matrix, unknowns_, unknowns_, PETSC_DETERMINE, PETSC_DETERMINE));
+  const bool whole = rods.begin == 0 && rods.end == int(rods_.size());
+  PetscCall(MatCreate(whole ? PETSC_COMM_WORLD : PETSC_COMM_SELF, matrix));
+  PetscCall(MatSetSizes(*matrix, unknowns(rods), unknowns(rods), PETSC_DETERMINE, PETSC_DETERMINE));
   PetscCall(MatSetType(*matrix, MATAIJ));
   PetscCall(MatSetFromOptions(*matrix));
   PetscCall(MatSetOption(*matrix, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(MatSetOption(*matrix, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
   PetscCall(MatSetPreallocationCOO(*matrix, PetscCount(row.size()), row.data(), column.data()));
-  entries_.resize(source_.size());
+  pattern->entries.resize(source_of.size());
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode DofMap::fillMatrix(const EdgeBlocks &blocks, Mat matrix) {
+PetscErrorCode DofMap::fillMatrix(const EdgeBlocks &blocks, Pattern &pattern, Mat matrix) {
   PetscFunctionBeginUser;
-  for (std::size_t n = 0; n < source_.size(); ++n)
-    entries_[n] = source_[n] >= 0 ? blocks.data()[source_[n]] : -blocks.data()[~source_[n]];
-  PetscCall(MatSetValuesCOO(matrix, entries_.data(), INSERT_VALUES));
+  for (std::size_t n = 0; n < pattern.source.size(); ++n) {
+    const std::ptrdiff_t from = pattern.source[n];
+    pattern.entries[n] = from >= 0 ? blocks.data()[from] : -blocks.data()[~from];
+  }
+  PetscCall(MatSetValuesCOO(matrix, pattern.entries.data(), INSERT_VALUES));
   PetscFunctionReturn(0);
 }
 
@@ -222,6 +319,34 @@ void DofMap::fold(const RodRange &rod, Planes &sums) const {
     }
 }
 
+void DofMap::copyJoined(RodSet islands, Planes &increment) const {
+  for (const JoinedVertex &j : joinedVertices(islands)) {
+    if (j.isCopy()) increment.setVector(0, j.slot, increment.vector(0, j.first_slot));
+    copyBehindRing(rods_[j.rod], increment);
+  }
+  for (const JoinedEdge &j : joinedEdges(islands))
+    if (!j.isFirst()) increment.setVector(0, j.frame, increment.vector(0, j.first_frame));
+}
+
+void DofMap::foldJoined(RodSet islands, Planes &sums) const {
+  auto move = [&](int from, int to) {
+    sums.setVector(0, to, sums.vector(0, to) + sums.vector(0, from));
+    sums.setVector(0, from, Vec3::Zero());
+  };
+  for (const JoinedVertex &j : joinedVertices(islands))
+    if (j.isCopy()) move(j.slot, j.first_slot);
+  for (const JoinedEdge &j : joinedEdges(islands))
+    if (!j.isFirst()) move(j.frame, j.first_frame);
+}
+
+double DofMap::dot(RodSet island, const Planes &a, const Planes &b) const {
+  double sum = 0;
+  for (int r = island.begin; r < island.end; ++r) sum += tendril::dot(rods_[r], a, b);
+  for (const JoinedEdge &j : joinedEdges(island))
+    if (j.isFirst()) sum += a.vector(0, j.frame).dot(b.vector(0, j.frame));
+  return sum;
+}
+
 PetscErrorCode DofMap::gather(const Planes &values, RodSet rods, Vec out, const std::vector<char> *active) const {
   PetscScalar *begin;
   PetscFunctionBeginUser;
@@ -234,7 +359,7 @@ PetscErrorCode DofMap::gather(const Planes &values, RodSet rods, Vec out, const 
       continue;
     }
     const PetscInt *u = &unknown_[std::size_t(slot_size) * rod.first_slot];
-    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s, u += slot_size) // unknowns follow each other
+    for (int s = rod.first_slot; s < unknown_end_[r]; ++s, u += slot_size) // unknowns follow each other
       for (int a = 0; a < slot_size; ++a)
         if (u[a] >= 0) *to++ = values[a][s];
   }
@@ -250,10 +375,11 @@ PetscErrorCode DofMap::scatter(Vec in, RodSet rods, Planes &values) const {
   for (int r = rods.begin; r < rods.end; ++r) {
     const RodRange &rod = rods_[r];
     const PetscInt *u = &unknown_[std::size_t(slot_size) * rod.first_slot];
-    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s, u += slot_size)
+    for (int s = rod.first_slot; s < unknown_end_[r]; ++s, u += slot_size)
       for (int a = 0; a < slot_size; ++a) values[a][s] = u[a] >= 0 ? *next++ : 0.0;
     copyBehindRing(rod, values);
   }
+  copyJoined(rods, values);
   PetscCall(VecRestoreArrayRead(in, &from));
   PetscFunctionReturn(0);
 }

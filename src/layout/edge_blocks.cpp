@@ -19,7 +19,8 @@ void EdgeBlocks::fold(const RodRange &rod) {
   }
 }
 
-void EdgeBlocks::multiply(const RodRange &rod, const Planes &x, Planes &y) const {
+void EdgeBlocks::multiply(const RodRange &rod, std::span<const JoinedEdge> joined_edges, const Planes &x,
+                          Planes &y) const {
   using Four = std::array<double, edge_size>;
   auto edge = [&](int i) {
     Four d{0, 0, 0, x[3][rod.slot(i)]};
@@ -62,9 +63,23 @@ void EdgeBlocks::multiply(const RodRange &rod, const Planes &x, Planes &y) const
     if (i > 0) add(i - 1, force_before);
     before = here;
   }
+  for (const JoinedEdge &j : joined_edges) {
+    const Four here = edge(j.edge);
+    Four force{};
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c)
+        y[r][j.frame] += value(vertex(std::min(r, c), std::max(r, c)), j.frame - rod.first_slot) * x[c][j.frame];
+      for (int c = 0; c < edge_size; ++c) {
+        const double v = value(across(r, c), j.cell - rod.first_slot);
+        y[r][j.frame] += v * here[c];
+        force[c] += v * x[r][j.frame];
+      }
+    }
+    add(j.edge, force);
+  }
 }
 
-double EdgeBlocks::magnitude(const RodRange &rod, const Planes &x) const {
+double EdgeBlocks::magnitude(const RodRange &rod, std::span<const JoinedEdge> joined_edges, const Planes &x) const {
   double sum = 0;
   std::array<double, edge_size> before{};
   for (int i = 0; i < rod.vertices; ++i)
@@ -82,6 +97,17 @@ double EdgeBlocks::magnitude(const RodRange &rod, const Planes &x) const {
       }
     before = here;
   }
+  for (const JoinedEdge &j : joined_edges)
+    for (int r = 0; r < 3; ++r) {
+      for (int c = r; c < 3; ++c)
+        sum += std::pow((r == c ? 1 : 2) * entry(rod, vertex(r, c))[j.frame - rod.first_slot] * x[r][j.frame] *
+                            x[c][j.frame],
+                        2);
+      for (int c = 0; c < edge_size; ++c) {
+        const double d = c == 3 ? x[3][rod.slot(j.edge)] : x[c][rod.slot(j.edge + 1)] - x[c][rod.slot(j.edge)];
+        sum += std::pow(2 * entry(rod, across(r, c))[j.cell - rod.first_slot] * x[r][j.frame] * d, 2);
+      }
+    }
   return std::sqrt(sum);
 }
 

@@ -21,7 +21,7 @@ class CellBuilder {
 public:
   CellBuilder(const Scene &scene, int rod, Elements &out)
       : rod_(scene.rods[rod]), range_(out.rods[rod]), loose_(out.loose[rod]), next_(range_.looseSlot()), out_(out),
-        holder_(rod_.vertices(), nullptr) {
+        joined_(out.joinedEdges({rod, rod + 1})), holder_(rod_.vertices(), nullptr) {
     for (std::size_t s = 0; s < scene.supports.size(); ++s) {
       const Support &support = scene.supports[s];
       if (support.rod != rod || !support.holdsTwist()) continue;
@@ -41,6 +41,11 @@ public:
       const int before = rod_.edgeBefore(v), after = rod_.edgeAfter(v);
       const Support *holder = holder_[v];
       const bool clamp = holder && holder->kind == Support::Kind::clamp;
+      if (isJoined(v)) { // no support turns a frame there
+        for (const JoinedEdge &j : joined_)
+          if (j.vertex == v) addJoinedCell(j);
+        continue;
+      }
       if (before >= 0 && after >= 0 && !clamp) {
         const Frame f0 = referenceFrame(rod_, before), f1 = referenceFrame(rod_, after);
         add(place(v), f0, f1, 0.5 * (f0.length + f1.length), {0.5, 0.5}, {1, 1}, rod_.material.flexural_stiffness,
@@ -58,7 +63,7 @@ public:
   void addEndCouples(const Scene &scene, int rod) {
     for (const bool last : {false, true}) {
       const int v = last ? rod_.edges() : 0, edge = last ? rod_.edges() - 1 : 0;
-      if (rod_.closed || holder_[v]) continue;
+      if (rod_.closed || holder_[v] || isJoined(v)) continue;
       const int cell = range_.slot(last ? edge : 1);
       EndCouple end{last, range_.slot(edge), out_.constants_[6][cell] != 0 ? cell : -1, {}, Vec3::Zero(), 0};
       for (const EdgeMoment &m : scene.moments) {
@@ -81,8 +86,13 @@ private:
   std::vector<LooseCell> &loose_;
   int next_; ///< slot of a frame or cell along the rod
   Elements &out_;
+  std::span<const JoinedEdge> joined_;
   std::vector<const Support *> holder_; ///< of the twist at each vertex
   const Support *supports_;
+
+  bool isJoined(int v) const {
+    return std::any_of(joined_.begin(), joined_.end(), [=](const JoinedEdge &j) { return j.vertex == v; });
+  }
 
   bool isEnd(int v) const { return !rod_.closed && (v == 0 || v + 1 == rod_.vertices()); }
   /// Slot of a vertex as cells see it: the first vertex of a ring lies behind its last.
@@ -109,6 +119,22 @@ private:
       add(slot, f, held, 0.5 * f.length, {0.5, 0}, {1, 0}, flexural, rod_.material.torsional_stiffness);
     else
       add(slot, held, f, 0.5 * f.length, {0, 0.5}, {0, 1}, flexural, rod_.material.torsional_stiffness);
+  }
+
+  /// Between an edge and the frame of a junction. A rod that is stress-free as drawn is so at any angle; one of given
+  /// natural strains turns at its vertices along the rod, too.
+  void addJoinedCell(const JoinedEdge &j) {
+    const Frame f = referenceFrame(rod_, j.edge);
+    const Frame at = rod_.natural == Rod::Natural::as_drawn || isEnd(j.vertex) ? f : frameAtVertex(rod_, j.vertex);
+    const Frame drawn{at.tangent, orthonormalised(at.director, at.tangent), 1};
+    out_.joined_frame_[&j - out_.joined_edges_.items.data()] = drawn;
+    const int edge = range_.slot(j.edge), middle = place(j.vertex);
+    loose_.push_back(j.ends ? LooseCell{j.cell, edge, j.frame, middle, 1} : LooseCell{j.cell, j.frame, edge, middle, 0});
+    const auto &[flexural, torsional] = std::pair(rod_.material.flexural_stiffness, rod_.material.torsional_stiffness);
+    if (j.ends)
+      add(j.cell, f, drawn, 0.5 * f.length, {0.5, 0}, {1, 0}, flexural, torsional);
+    else
+      add(j.cell, drawn, f, 0.5 * f.length, {0, 0.5}, {0, 1}, flexural, torsional);
   }
 
   void add(int slot, const Frame &f0, const Frame &f1, double length, std::array<double, 2> weight,
@@ -142,9 +168,11 @@ private:
 
 Elements::Elements(const Scene &scene, const DofMap &dofs)
     : rods(dofs.rods()), slots(dofs.slots()), loose(rods.size()), end_couples(rods.size()),
-      support_slot(scene.supports.size(), -1), rod_cells{0} {
+      support_slot(scene.supports.size(), -1), rod_cells{0}, groups(dofs.groups()),
+      joined_edges_(dofs.joinedEdges()), joined_vertices_(dofs.joinedVertices()) {
   std::vector<int> free_slots; ///< per rod, behind those of its supports
-  constants_ = Planes(7, slots);
+  constants_ = Planes(8, slots);
+  joined_frame_.resize(joined_edges_.items.size());
   cells_ = Planes(cell_planes, slots);
   for (const int plane : {1, 2}) std::fill_n(constants_[plane], slots, 1.0);
   double *mass = constants_[0];
@@ -155,8 +183,9 @@ Elements::Elements(const Scene &scene, const DofMap &dofs)
     energy.push_back(rod.energy);
     for (int v = 0; v < range.vertices; ++v) {
       vertex_slot.push_back(range.slot(v));
-      constants_[5][range.slot(v)] = dofs.isHeld(range.first_vertex + v) ? 0 : 1;
+      constants_[5][range.slot(v)] = constants_[7][range.slot(v)] = dofs.isHeld(range.first_vertex + v) ? 0 : 1;
     }
+    for (const JoinedVertex &j : joinedVertices({int(r), int(r) + 1})) constants_[7][j.slot] = 0;
     length_.push_back(rod.length());
     for (int i = 0; i < range.edges; ++i) {
       const double length = rod.edge(i).norm();

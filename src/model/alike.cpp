@@ -81,7 +81,8 @@ std::vector<int> firstAlike(const Scene &scene, const std::vector<Drawing> &draw
   };
   std::vector<int> first, kinds;
   for (int s = 0; s < int(rods); ++s) {
-    const auto found = scene.rotation.angular_velocity.isZero(0) && scene.colliders.empty()
+    const auto found = scene.rotation.angular_velocity.isZero(0) && scene.colliders.empty() &&
+                               scene.junctions.empty()
                            ? std::find_if(kinds.begin(), kinds.end(), [&](int r) { return alike(r, s); })
                            : kinds.end();
     first.push_back(found == kinds.end() ? s : *found);
@@ -102,6 +103,7 @@ Scene withRods(const Scene &scene, const std::vector<int> &rods) {
   }
   keep(scene.supports, place, out.supports);
   keep(scene.constraints, place, out.constraints);
+  if (rods.size() == scene.rods.size()) out.junctions = scene.junctions; // of joined rods none is left out
   keep(scene.forces, place, out.forces);
   keep(scene.moments, place, out.moments);
   return out;

@@ -146,7 +146,7 @@ int movedEdge(const Rod &written, const Drawing &drawing, int edge, int edges) {
   return found;
 }
 
-/// Vertices that supports, constraints and loads name, without the ends of a rod and the first of a closed one: those
+/// Vertices that supports, constraints, junctions and loads name, without the ends of a rod and the first of a closed one: those
 /// are vertices of any number of edges.
 std::vector<int> namedVertices(const Scene &scene, int r) {
   std::vector<int> named;
@@ -156,6 +156,8 @@ std::vector<int> namedVertices(const Scene &scene, int r) {
   for (const Support &s : scene.supports) add(s.rod, s.vertex);
   for (const Constraint &c : scene.constraints)
     if (c.isPin()) add(c.rod, c.at);
+  for (const Junction &j : scene.junctions)
+    for (const Junction::Member &m : j.members) add(m.rod, m.vertex);
   for (const NodalForce &f : scene.forces) add(f.rod, f.vertex);
   return named;
 }
@@ -310,6 +312,14 @@ Scene remesh(const Scene &written, const std::vector<Drawing> &drawings, const s
           c.tangent_given ? transport<double>(drawn.director, drawn.tangent, c.frame.tangent) : drawn.director;
     if (!c.tangent_given) c.frame.tangent = drawn.tangent;
     c.frame.director = orthonormalised(c.frame.director, c.frame.tangent);
+  }
+  for (const Junction &junction : written.junctions) {
+    Junction &j = scene.junctions.emplace_back(junction);
+    for (Junction::Member &m : j.members) {
+      m.vertex = movedVertex(written.rods[m.rod], drawings[m.rod], m.vertex, edges[m.rod]);
+      scene.rods[m.rod].position[m.vertex] = // to the bit
+          scene.rods[j.members[0].rod].position[j.members[0].vertex];
+    }
   }
   for (const NodalForce &f : written.forces)
     scene.forces.push_back({f.rod, movedVertex(written.rods[f.rod], drawings[f.rod], f.vertex, edges[f.rod]), f.force});

@@ -1,9 +1,8 @@
 #include "tendril/solver/banded.hpp"
 
 #include "tendril/solver/elimination.hpp"
+#include "tendril/solver/factor_type.hpp"
 #include "tendril/solver/substitution.hpp"
-
-#include <petsc/private/matimpl.h>
 
 #include <algorithm>
 #include <numeric>
@@ -17,8 +16,8 @@ template <class T> const T *as(const double *p) { return reinterpret_cast<const 
 
 } // namespace
 
-void addMetric(const Planes &metric, const double *edges, const RodRange &rod, double scale, const Planes &v,
-               Planes &y) {
+void addMetric(const Planes &metric, const double *edges, const RodRange &rod, std::span<const JoinedEdge> joined,
+               double scale, const Planes &v, Planes &y) {
   for (int a = 0; a < slot_size; ++a)
     for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) y[a][s] += scale * metric[a][s] * v[a][s];
   for (int a = 0; edges && a < 3; ++a)
@@ -27,6 +26,8 @@ void addMetric(const Planes &metric, const double *edges, const RodRange &rod, d
       y[a][s] -= force;
       y[a][s + 1] += force;
     }
+  for (const JoinedEdge &j : joined)
+    for (int a = 0; a < 3; ++a) y[a][j.frame] += scale * metric[a][j.frame] * v[a][j.frame];
 }
 
 BandedFactor::BandedFactor(const DofMap &dofs, RodSet set, BandedWorkspace &workspace)
@@ -152,7 +153,8 @@ template <class T> void BandedFactor::factorGroup(const Group &group, const Band
     zero = elimination.zero;
   };
   auto eliminate = [&]<bool ring, bool joined>(const auto &read) {
-    run(Elimination<T, ring, joined, std::decay_t<decltype(read)>>(first, held, read, records));
+    run(Elimination<T, ring ? Border::ring : Border::none, joined, std::decay_t<decltype(read)>>({0, first.edges}, held,
+                                                                                                 read, records));
   };
   if (first.closed)
     joins ? eliminate.template operator()<true, true>(rare) : eliminate.template operator()<true, false>(rare);
@@ -225,98 +227,6 @@ template <class T> void BandedFactor::solveGroup(const Group &group, const Petsc
 
 namespace {
 
-constexpr const char *name = "banded";
-
-BandedFactor *factorOf(Mat f) { return static_cast<BandedFactor *>(f->data); }
-
-PetscErrorCode numeric(Mat f, Mat a, const MatFactorInfo *) {
-  BandedSystem *system;
-  PetscFunctionBegin;
-  PetscCall(MatShellGetContext(a, &system));
-  factorOf(f)->factor(*system);
-  f->assembled = PETSC_TRUE;
-  PetscFunctionReturn(0);
-}
-
-PetscErrorCode solveVec(Mat f, Vec b, Vec x) {
-  const PetscScalar *right;
-  PetscScalar *out;
-  PetscFunctionBegin;
-  PetscCall(VecGetArrayRead(b, &right));
-  PetscCall(VecGetArrayWrite(x, &out));
-  factorOf(f)->solve(right, out);
-  PetscCall(VecRestoreArrayWrite(x, &out));
-  PetscCall(VecRestoreArrayRead(b, &right));
-  PetscFunctionReturn(0);
-}
-
-PetscErrorCode inertia(Mat f, PetscInt *negative, PetscInt *zero, PetscInt *positive) {
-  PetscInt minus = 0, none = 0;
-  PetscFunctionBegin;
-  for (int r = factorOf(f)->rods().begin; r < factorOf(f)->rods().end; ++r) {
-    minus += factorOf(f)->negativePivots(r);
-    none += factorOf(f)->zeroPivots(r);
-  }
-  if (negative) *negative = minus;
-  if (zero) *zero = none;
-  if (positive) *positive = f->rmap->n - minus - none;
-  PetscFunctionReturn(0);
-}
-
-PetscErrorCode getInfo(Mat f, MatInfoType, MatInfo *info) {
-  PetscFunctionBegin;
-  *info = {};
-  info->nz_used = info->nz_allocated = double(f->rmap->n) * Record<double>::plain / slot_size;
-  info->memory = double(factorOf(f)->bytes());
-  PetscFunctionReturn(0);
-}
-
-PetscErrorCode symbolic(Mat f, Mat, IS, const MatFactorInfo *) {
-  PetscFunctionBegin;
-  f->ops->choleskyfactornumeric = numeric;
-  f->ops->solve = solveVec;
-  f->ops->getinertia = inertia;
-  PetscFunctionReturn(0);
-}
-
-PetscErrorCode destroy(Mat f) {
-  PetscFunctionBegin;
-  delete factorOf(f);
-  f->data = nullptr;
-  PetscCall(PetscObjectComposeFunction((PetscObject)f, "MatFactorGetSolverType_C", nullptr));
-  PetscFunctionReturn(0);
-}
-
-PetscErrorCode solverType(Mat, MatSolverType *type) {
-  PetscFunctionBegin;
-  *type = name;
-  PetscFunctionReturn(0);
-}
-
-PetscErrorCode create(Mat a, MatFactorType, Mat *out) {
-  Mat f;
-  BandedSystem *system;
-  PetscFunctionBegin;
-  PetscCall(MatShellGetContext(a, &system));
-  PetscCall(MatCreate(PetscObjectComm((PetscObject)a), &f));
-  PetscCall(MatSetSizes(f, a->rmap->n, a->cmap->n, a->rmap->N, a->cmap->N));
-  PetscCall(PetscStrallocpy(name, &((PetscObject)f)->type_name));
-  PetscCall(MatSetUp(f));
-  f->data = new BandedFactor(*system->dofs, system->rods, *system->workspace);
-  f->ops->choleskyfactorsymbolic = symbolic;
-  f->ops->getinfo = getInfo;
-  f->ops->destroy = destroy;
-  PetscCall(PetscObjectComposeFunction((PetscObject)f, "MatFactorGetSolverType_C", solverType));
-  f->factortype = MAT_FACTOR_CHOLESKY;
-  f->assembled = f->preallocated = PETSC_TRUE;
-  PetscCall(PetscFree(f->solvertype));
-  PetscCall(PetscStrallocpy(name, &f->solvertype));
-  f->canuseordering = PETSC_FALSE;
-  PetscCall(PetscStrallocpy(MATORDERINGEXTERNAL, (char **)&f->preferredordering[MAT_FACTOR_CHOLESKY]));
-  *out = f;
-  PetscFunctionReturn(0);
-}
-
 PetscErrorCode multiply(Mat a, Vec x, Vec y) {
   BandedSystem *system;
   PetscFunctionBegin;
@@ -326,10 +236,12 @@ PetscErrorCode multiply(Mat a, Vec x, Vec y) {
   PetscCall(dofs.scatter(x, system->rods, in));
   for (int r = system->rods.begin; r < system->rods.end; ++r) {
     const RodRange &rod = dofs.rods()[r];
-    system->blocks->multiply(rod, in, out);
-    addMetric(*system->metric, system->edge_metric, rod, (*system->shift)[r], in, out);
+    const std::span<const JoinedEdge> joined = dofs.joinedEdges({r, r + 1});
+    system->blocks->multiply(rod, joined, in, out);
+    addMetric(*system->metric, system->edge_metric, rod, joined, (*system->shift)[r], in, out);
     dofs.fold(rod, out);
   }
+  dofs.foldJoined(system->rods, out);
   PetscCall(dofs.gather(out, system->rods, y));
   PetscFunctionReturn(0);
 }
@@ -346,13 +258,14 @@ PetscErrorCode createBandedMatrix(BandedSystem *system, Mat *matrix) {
   PetscFunctionReturn(0);
 }
 
-const BandedFactor *bandedFactorOf(Mat factored) {
-  return factored->ops->choleskyfactornumeric == numeric ? factorOf(factored) : nullptr;
-}
+const BandedFactor *bandedFactorOf(Mat factored) { return FactorType<BandedFactor>::of(factored); }
 
-PetscErrorCode registerBanded() {
-  PetscFunctionBeginUser;
-  PetscCall(MatSolverTypeRegister(name, MATSHELL, MAT_FACTOR_CHOLESKY, create));
+PetscErrorCode registerBanded() { return FactorType<BandedFactor>::add(); }
+
+PetscErrorCode BandedFactor::view(PetscViewer viewer) const {
+  PetscFunctionBegin;
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  %d rods, each by itself, up to %d of one shape at once\n",
+                                   rods_.end - rods_.begin, int(lanes)));
   PetscFunctionReturn(0);
 }
 

@@ -4,19 +4,24 @@
 
 namespace tendril {
 
-Circulatory::Circulatory(const IncrementalPotential &potential, RodSet rods)
-    : potential_(potential), rods_(rods), counts_(rods.end - rods.begin) {
+Circulatory::Circulatory(const IncrementalPotential &potential, std::vector<RodSet> islands)
+    : potential_(potential), islands_(std::move(islands)) {
+  const RodSet rods{islands_.front().begin, islands_.back().end};
   for (const EdgeMoment &m : potential.scene().moments)
-    if (m.rod >= rods.begin && m.rod < rods.end) {
-      couples_.push_back(m);
-      ++counts_[m.rod - rods.begin];
-    }
+    if (m.rod >= rods.begin && m.rod < rods.end) couples_.push_back(m);
   std::stable_sort(couples_.begin(), couples_.end(),
                    [](const EdgeMoment &a, const EdgeMoment &b) { return a.rod < b.rod; });
-  const int most = *std::max_element(counts_.begin(), counts_.end());
+  int most = 0;
+  for (const RodSet island : islands_) most = std::max(most, countOn(island));
   right_ = Planes(slot_size, most > 0 ? potential.dofs().slots(rods) : 0);
   right_.setOrigin(potential.dofs().rods()[rods.begin].first_slot);
   solved_.assign(2 * most, right_);
+}
+
+int Circulatory::countOn(RodSet island) const {
+  auto before = [](const EdgeMoment &m, int rod) { return m.rod < rod; };
+  return int(std::lower_bound(couples_.begin(), couples_.end(), island.end, before) -
+             std::lower_bound(couples_.begin(), couples_.end(), island.begin, before));
 }
 
 double Circulatory::Column::dot(const Planes &x) const {
@@ -47,10 +52,15 @@ PetscErrorCode Circulatory::update(const Solve &solve) {
   for (std::size_t k = 0; k < solved_.size(); ++k) {
     right_.clear();
     std::size_t first = 0;
-    for (int r = rods_.begin; r < rods_.end; first += 2 * counts_[r++ - rods_.begin]) {
-      if (k >= std::size_t(2 * counts_[r - rods_.begin])) continue;
-      columns_[first + k].addTo(right_);
-      potential_.dofs().fold(potential_.dofs().rods()[r], right_);
+    for (const RodSet island : islands_) {
+      const std::size_t columns = 2 * std::size_t(countOn(island));
+      if (k < columns) {
+        const Column &column = columns_[first + k];
+        column.addTo(right_);
+        potential_.dofs().fold(potential_.dofs().rods()[column.rod], right_);
+        potential_.dofs().foldJoined(island, right_);
+      }
+      first += columns;
     }
     PetscCall(solve(right_, solved_[k]));
   }
@@ -59,8 +69,8 @@ PetscErrorCode Circulatory::update(const Solve &solve) {
 
 bool Circulatory::correct(Planes &x) const {
   std::size_t first = 0;
-  for (int r = rods_.begin; r < rods_.end; ++r) {
-    const int n = 2 * counts_[r - rods_.begin];
+  for (const RodSet island : islands_) {
+    const int n = 2 * countOn(island);
     if (n == 0) continue;
     const Column *column = columns_.data() + first;
     Eigen::VectorXd right(n);
@@ -81,11 +91,15 @@ bool Circulatory::correct(Planes &x) const {
     }
     const Eigen::VectorXd c = system.partialPivLu().solve(turned);
     if (!c.allFinite()) return false;
-    const RodRange &rod = potential_.dofs().rods()[r];
     for (int k = 0; k < n; ++k)
-      for (int a = 0; a < slot_size; ++a)
-        for (int s = rod.first_slot; s < rod.vertexEnd() + (rod.closed ? 2 : 0); ++s)
-          x[a][s] -= c[k] * solved_[k][a][s];
+      for (int r = island.begin; r < island.end; ++r) {
+        const RodRange &rod = potential_.dofs().rods()[r];
+        for (int a = 0; a < slot_size; ++a)
+          for (int s = rod.first_slot; s < rod.vertexEnd() + (rod.closed ? 2 : 0); ++s)
+            x[a][s] -= c[k] * solved_[k][a][s];
+        for (const JoinedEdge &j : potential_.dofs().joinedEdges({r, r + 1}))
+          x.setVector(0, j.frame, x.vector(0, j.frame) - c[k] * solved_[k].vector(0, j.frame));
+      }
     first += n;
   }
   return true;

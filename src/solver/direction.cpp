@@ -60,6 +60,12 @@ double NewtonSolver::firstShift(int r) const {
   return stiffness / (m.linear_density * length * length);
 }
 
+double NewtonSolver::firstShift(RodSet island) const {
+  double least = HUGE_VAL;
+  for (int r = island.begin; r < island.end; ++r) least = std::min(least, firstShift(r));
+  return least;
+}
+
 /// Adds multiples of the metric to the indefinite Hessians until all pivots are positive, so that the step goes
 /// downhill. Starts near the last shift that was needed, so that a run of indefinite iterates costs one extra
 /// factorisation each.
@@ -67,11 +73,14 @@ PetscErrorCode NewtonSolver::shiftUntilPositive(bool regular) {
   PetscFunctionBeginUser;
   for (int attempt = 0; attempt < 40; ++attempt) {
     bool any = false;
-    for (int r = rods_.begin; r < rods_.end; ++r) {
+    for (const RodSet island : islands_) {
+      const int r = island.begin;
       if (!work_->indefinite[r] || (work_->negative[r] + work_->zero[r] == 0 && regular)) continue;
-      double &shift = work_->shift[r];
-      shift = shift > 0 ? 8 * shift : work_->last_shift[r] > 0 ? 0.25 * work_->last_shift[r] : firstShift(r);
-      work_->last_shift[r] = shift;
+      const double shift = work_->shift[r] > 0        ? 8 * work_->shift[r]
+                           : work_->last_shift[r] > 0 ? 0.25 * work_->last_shift[r]
+                                                      : firstShift(island);
+      fill(work_->shift, island, shift);
+      fill(work_->last_shift, island, shift);
       any = true;
     }
     if (!any) break;
@@ -82,6 +91,19 @@ PetscErrorCode NewtonSolver::shiftUntilPositive(bool regular) {
   PetscFunctionReturn(0);
 }
 
+/// y = K x of an island, by the blocks as they are.
+void NewtonSolver::multiplyHessian(RodSet island, const Planes &x, Planes &y) {
+  const DofMap &dofs = potential_->dofs();
+  for (int r = island.begin; r < island.end; ++r) {
+    const RodRange &rod = dofs.rods()[r];
+    for (int a = 0; a < slot_size; ++a) std::fill(y[a] + rod.first_slot, y[a] + rod.vertexEnd() + 2, 0.0);
+    for (const JoinedEdge &j : dofs.joinedEdges({r, r + 1})) y.setVector(0, j.frame, Vec3::Zero());
+    potential_->blocks().multiply(rod, dofs.joinedEdges({r, r + 1}), x, y);
+    dofs.fold(rod, y);
+  }
+  dofs.foldJoined(island, y);
+}
+
 /// Rods whose Hessian gives no way down as it is: with negative pivots, or with zero ones where forces act on the
 /// motions that they leave out. `y`: Newton's direction.
 PetscErrorCode NewtonSolver::findIndefinite(Vec y, bool regular, bool *any) {
@@ -89,28 +111,36 @@ PetscErrorCode NewtonSolver::findIndefinite(Vec y, bool regular, bool *any) {
   PetscFunctionBeginUser;
   bool scattered = false;
   *any = false;
-  for (int r = rods_.begin; r < rods_.end; ++r) {
-    char &indefinite = work_->indefinite[r];
-    indefinite = work_->active[r] && (work_->negative[r] > 0 || !regular);
-    if (work_->active[r] && !indefinite && work_->zero[r] > 0 && !isAtNoise(work_->residual[r], 0)) {
-      if (!scattered) PetscCall(potential_->dofs().scatter(y, rods_, work_->increment));
+  const DofMap &dofs = potential_->dofs();
+  for (const RodSet island : islands_) {
+    const bool active = work_->active[island.begin];
+    bool indefinite = active && (work_->negative[island.begin] > 0 || !regular), noise = true;
+    for (int r = island.begin; r < island.end; ++r) noise = noise && isAtNoise(work_->residual[r], 0);
+    if (active && !indefinite && work_->zero[island.begin] > 0 && !noise) {
+      if (!scattered) PetscCall(dofs.scatter(y, rods_, work_->increment));
       scattered = true;
-      const RodRange &rod = potential_->elements().rods[r];
-      const Planes &gradient = potential_->derivatives({r, r + 1}).gradient;
+      const Planes &gradient = potential_->derivatives(island).gradient;
       Planes &rest = work_->coordinates; // free until the iterate is written
-      for (int a = 0; a < slot_size; ++a) std::fill(rest[a] + rod.first_slot, rest[a] + rod.vertexEnd() + 2, 0.0);
-      potential_->blocks().multiply(rod, work_->increment, rest);
-      potential_->dofs().fold(rod, rest);
+      multiplyHessian(island, work_->increment, rest);
       const double *freedom = potential_->elements().freedom();
       double forces = 0, out_of_balance = 0;
-      for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
-        for (int a = 0; a < slot_size; ++a) {
-          const double weight = a < 3 ? freedom[s] : rod.twist ? 1 / std::pow(potential_->length(r), 2) : 0;
-          forces += weight * std::pow(gradient[a][s], 2);
-          out_of_balance += weight * std::pow(gradient[a][s] - rest[a][s], 2);
+      for (int r = island.begin; r < island.end; ++r) {
+        const RodRange &rod = potential_->elements().rods[r];
+        for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
+          for (int a = 0; a < slot_size; ++a) {
+            const double weight = a < 3 ? freedom[s] : rod.twist ? 1 / std::pow(potential_->length(r), 2) : 0;
+            forces += weight * std::pow(gradient[a][s], 2);
+            out_of_balance += weight * std::pow(gradient[a][s] - rest[a][s], 2);
+          }
+        for (const JoinedEdge &j : dofs.joinedEdges({r, r + 1})) {
+          const double weight = 1 / std::pow(potential_->length(r), 2);
+          forces += weight * gradient.vector(0, j.frame).squaredNorm();
+          out_of_balance += weight * (gradient.vector(0, j.frame) - rest.vector(0, j.frame)).squaredNorm();
         }
+      }
       indefinite = out_of_balance > little * little * forces;
     }
+    fill(work_->indefinite, island, indefinite);
     *any = *any || indefinite;
   }
   PetscFunctionReturn(0);
@@ -126,9 +156,9 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
   PetscFunctionBeginUser;
   if (regular && circulatory_ && potential_->step().isStatic()) {
     bool any = false;
-    for (int r = rods_.begin; r < rods_.end; ++r) {
-      if (circulatory_->acts(r)) work_->indefinite[r] = false;
-      any = any || work_->indefinite[r];
+    for (const RodSet island : islands_) {
+      if (circulatory_->acts(island)) fill(work_->indefinite, island, false);
+      any = any || work_->indefinite[island.begin];
     }
     if (!any) PetscFunctionReturn(0);
   }
@@ -136,9 +166,10 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
   const HessianKind kind =
       potential_->step().hessian == HessianKind::exact ? HessianKind::uncompressed : potential_->step().hessian;
   bool compressed = false;
-  for (int r = rods_.begin; r < rods_.end; ++r) {
+  for (const RodSet island : islands_) {
+    const int r = island.begin;
     if (!work_->active[r] || !work_->indefinite[r] || work_->negative[r] <= few) continue;
-    potential_->assembleRod(r, kind);
+    potential_->assemble(island, kind);
     compressed = true;
   }
   if (compressed) {
@@ -153,14 +184,18 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
   for (bool longer = potential_->step().isStatic(); longer;) {
     longer = false;
     PetscCall(potential_->dofs().scatter(y, rods_, work_->increment));
-    for (int r = rods_.begin; r < rods_.end; ++r)
-      if (work_->active[r] && work_->shift[r] > 0 &&
-          work_->edge_metric[potential_->elements().rods[r].first_slot] > 0) { // what hangs on one place swings
-        const double size = sizeOf(r, work_->increment);
-        if (!(size > longest)) continue;
-        work_->last_shift[r] = work_->shift[r] *= std::min(size / longest, 1e6);
-        longer = true;
-      }
+    for (const RodSet island : islands_) {
+      if (!(work_->active[island.begin] && work_->shift[island.begin] > 0)) continue;
+      double size = 0;
+      for (int r = island.begin; r < island.end; ++r)
+        if (work_->edge_metric[potential_->elements().rods[r].first_slot] > 0) // what hangs on one place swings
+          size = std::max(size, sizeOf(r, work_->increment));
+      if (!(size > longest)) continue;
+      const double shift = work_->shift[island.begin] * std::min(size / longest, 1e6);
+      fill(work_->shift, island, shift);
+      fill(work_->last_shift, island, shift);
+      longer = true;
+    }
     if (!longer) break;
     PetscCall(refactor());
     ++report_.shifts;
@@ -181,10 +216,12 @@ PetscErrorCode NewtonSolver::includeMotion(Vec y) {
     const RodRange &rod = dofs.rods()[r];
     for (int a = 0; a < slot_size; ++a)
       std::copy(gradient[a] + rod.first_slot, gradient[a] + rod.vertexEnd() + 2, right[a] + rod.first_slot);
-    potential_->blocks().multiply(rod, work_->motion, right);
+    for (const JoinedEdge &j : dofs.joinedEdges({r, r + 1})) right.setVector(0, j.frame, gradient.vector(0, j.frame));
+    potential_->blocks().multiply(rod, dofs.joinedEdges({r, r + 1}), work_->motion, right);
     if (potential_->obstaclesGo(r)) potential_->addObstacleMotion(r, right);
     dofs.fold(rod, right);
   }
+  dofs.foldJoined(rods_, right);
   PetscCall(dofs.gather(right, rods_, right_, &work_->active));
   PetscCall(SNESGetKSP(snes_, &ksp));
   PetscCall(KSPSolve(ksp, right_, y));
@@ -210,7 +247,7 @@ PetscErrorCode NewtonSolver::direct(Vec x, Vec f, Vec y) {
     PetscCall(solveAgain(f, y));
   else
     PetscCall(secants_.apply(
-        potential_->dofs(), rods_,
+        potential_->dofs(), islands_,
         [this](Vec right, Vec solution) -> PetscErrorCode { return KSPSolve(factored(), right, solution); }, f, right_,
         y));
   PetscCall(readInertia(&regular));

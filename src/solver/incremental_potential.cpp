@@ -3,6 +3,7 @@
 #include "tendril/energy/edge.hpp"
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 namespace tendril {
@@ -41,7 +42,7 @@ void IncrementalPotential::beginRod(const State &start, int r) {
   if (obstacles_move_) moveObstacles(r);
   supports_.follow(r, iterate_);
   scales_[r].force = tendril::forceScale(scene_, elements_, step_, start, scales_[r], r);
-  known_[r] = Known::nothing;
+  known(r) = Known::nothing;
 }
 
 void IncrementalPotential::setLoadFactor(double factor) {
@@ -141,6 +142,15 @@ double IncrementalPotential::energy(const Configuration &configuration, RodSet r
   return sum;
 }
 
+void IncrementalPotential::assemble(RodSet islands, HessianKind hessian) {
+  for (int r = islands.begin; r < islands.end; ++r) {
+    assembleRod(r, hessian);
+    known(r) = hessian == HessianKind::none ? Known::gradient : Known::all;
+  }
+  dofs_.foldJoined(islands, derivatives_.gradient);
+  dofs_.foldJoined(islands, derivatives_.equilibrium);
+}
+
 void IncrementalPotential::assembleRod(int r, HessianKind hessian) {
   if (r < focus_.begin || r >= focus_.end) focus(all());
   const RodRange &rod = elements_.rods[r];
@@ -153,10 +163,11 @@ void IncrementalPotential::assembleRod(int r, HessianKind hessian) {
   for (int a = 0; a < slot_size; ++a)
     for (int s = rod.first_slot; s < rod.vertexEnd() + 2; s += lanes)
       addTo(d.gradient[a] + s, read<Pack>(d.equilibrium[a] + s));
+  for (const JoinedEdge &j : elements_.joinedEdges({r, r + 1}))
+    d.gradient.setVector(0, j.frame, d.equilibrium.vector(0, j.frame));
   dofs_.fold(rod, d.gradient);
   dofs_.fold(rod, d.equilibrium);
   if (hessian != HessianKind::none) d.blocks.fold(rod);
-  known_[r] = hessian == HessianKind::none ? Known::gradient : Known::all;
 }
 
 void IncrementalPotential::focus(RodSet rods) {
@@ -172,14 +183,14 @@ void IncrementalPotential::focus(RodSet rods) {
 
 const Derivatives &IncrementalPotential::derivatives(RodSet rods) {
   for (int r = rods.begin; r < rods.end; ++r)
-    if (known_[r] != Known::all) assembleRod(r, step_.hessian);
+    if (known(r) != Known::all) assemble(dofs_.islandOf(r), step_.hessian);
   return derivatives_;
 }
 
 double IncrementalPotential::renew(int r) {
   double change = 0;
   for (auto &term : terms_) change = std::max(change, term->renew(iterate_, r));
-  if (change > 0) known_[r] = Known::nothing;
+  if (change > 0) known(r) = Known::nothing;
   return change;
 }
 
@@ -190,7 +201,7 @@ void IncrementalPotential::addLoads(int r, Derivatives &out) const {
 }
 
 const Derivatives &IncrementalPotential::gradient(int r) {
-  if (known_[r] == Known::nothing) assembleRod(r, HessianKind::none);
+  if (known(r) == Known::nothing) assemble(dofs_.islandOf(r), HessianKind::none);
   return derivatives_;
 }
 
@@ -198,7 +209,7 @@ void IncrementalPotential::resetAxialForces(int r) {
   const RodRange &rod = elements_.rods[r];
   for (int i = rod.first_slot; i < rod.edgeEnd(); ++i)
     iterate_[C::axial_force][i] = axial_.stiffness()[i] * (iterate_[C::strain][i] - axial_.rest()[i]);
-  known_[r] = Known::nothing;
+  known(r) = Known::nothing;
 }
 
 void IncrementalPotential::setAxialForces(int r, const double *force) {
@@ -206,7 +217,7 @@ void IncrementalPotential::setAxialForces(int r, const double *force) {
   const RodRange &rod = elements_.rods[r];
   std::copy(force + rod.first_slot, force + rod.edgeEnd(), iterate_[C::axial_force] + rod.first_slot);
   iterate_.closeRing(rod);
-  known_[r] = Known::nothing;
+  known(r) = Known::nothing;
 }
 
 bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r, RetractionKind kind,
@@ -248,6 +259,22 @@ bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r,
   return fraction == 1;
 }
 
+void IncrementalPotential::turnFrames(RodSet islands, Planes &increment) const {
+  std::map<int, std::pair<Vec3, int>> spins; // by group
+  for (const JoinedEdge &j : elements_.joinedEdges(islands)) {
+    const int s = elements_.rods[j.rod].slot(j.edge);
+    const Frame f = iterate_.frameAt(s);
+    auto &[sum, count] = spins.try_emplace(j.group, Vec3::Zero(), 0).first->second;
+    sum += f.tangent.cross(increment.vector(0, s + 1) - increment.vector(0, s)) / f.length +
+           f.tangent * increment[3][s];
+    ++count;
+  }
+  for (const JoinedEdge &j : elements_.joinedEdges(islands)) {
+    const auto &[sum, count] = spins.at(j.group);
+    increment.setVector(0, j.frame, sum / count);
+  }
+}
+
 bool IncrementalPotential::tryMove(const Planes &increment, double scale, Configuration &trial) {
   for (int r = 0; r < all().end; ++r)
     if (!tryMove(increment, scale, r, trial)) return false;
@@ -257,7 +284,7 @@ bool IncrementalPotential::tryMove(const Planes &increment, double scale, Config
 void IncrementalPotential::accept(const Configuration &trial, int r) {
   iterate_.copyRod(elements_, r, trial);
   for (auto &term : terms_) term->moveIterate(iterate_, r);
-  known_[r] = Known::nothing;
+  known(r) = Known::nothing;
 }
 
 void IncrementalPotential::accept(const Configuration &trial) {
@@ -275,6 +302,7 @@ void IncrementalPotential::coordinates(Planes &x, RodSet rods) const {
     }
     if (rod.twist)
       std::copy(iterate_[C::spin] + rod.first_slot, iterate_[C::spin] + rod.edgeEnd(), x[3] + rod.first_slot);
+    for (const JoinedEdge &j : elements_.joinedEdges({r, r + 1})) x.setVector(0, j.frame, iterate_.positionAt(j.frame));
   }
 }
 
@@ -285,14 +313,16 @@ bool IncrementalPotential::moveTo(const Planes &x, RodSet rods, bool supports) {
   Configuration trial;
   for (int r = rods.begin; r < rods.end; ++r) {
     const RodRange &rod = elements_.rods[r];
-    bool moves = false;
     for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
-      for (int a = 0; a < slot_size; ++a) {
+      for (int a = 0; a < slot_size; ++a)
         if (dofs_.unknown(s, a) >= 0) increment[a][s] = x[a][s] - now[a][s];
-        moves = moves || increment[a][s] != 0;
-      }
+    for (const JoinedEdge &j : elements_.joinedEdges({r, r + 1}))
+      if (j.isFirst()) increment.setVector(0, j.frame, x.vector(0, j.frame) - now.vector(0, j.frame));
     dofs_.copyBehindRing(rod, increment);
-    if (!moves) continue;
+  }
+  dofs_.copyJoined(rods, increment);
+  for (int r = rods.begin; r < rods.end; ++r) {
+    if (dofs_.dot(dofs_.islandOf(r), increment, increment) == 0) continue;
     if (!tryMove(increment, 1.0, r, RetractionKind::additive, trial)) return false;
     accept(trial, r);
   }
@@ -365,6 +395,8 @@ bool IncrementalPotential::moveOn(double time, const StageRule &end) {
       for (int l = 0; l < std::min(lanes, rod.edges - i); ++l)
         increment[3][rod.slot(i + l)] = end.guess.atEdge(rod.first_edge + i + l) - spun[l];
     }
+    for (const JoinedEdge &j : elements_.joinedEdges({r, r + 1})) // as far again as in the first half
+      increment.setVector(0, j.frame, iterate_.positionAt(j.frame));
     dofs_.copyBehindRing(rod, increment);
   }
   remainingMotion(all(), increment);
@@ -382,6 +414,7 @@ bool IncrementalPotential::moveOn(double time, const StageRule &end) {
         for (int l = 0; l < std::min(lanes, rod.edges - i); ++l)
           increment[3][rod.slot(i + l)] = end.guess.atEdge(rod.first_edge + i + l) - spun[l];
       }
+      for (const JoinedEdge &j : elements_.joinedEdges({r, r + 1})) increment.setVector(0, j.frame, Vec3::Zero());
       dofs_.copyBehindRing(rod, increment);
       if (!tryMove(increment, 1, r, RetractionKind::additive, trial)) return false;
       accept(trial, r);

@@ -97,7 +97,8 @@ PetscErrorCode NewtonSolver::assemble(Mat) {
   secants_.clear();
   for (int r = rods_.begin; r < rods_.end; ++r)
     if (work_->active[r]) potential_->derivatives({r, r + 1});
-  for (int r = rods_.begin; r < rods_.end; ++r) work_->shift[r] = follows_ ? regular_lift * firstShift(r) : 0;
+  for (const RodSet island : islands_)
+    fill(work_->shift, island, follows_ ? regular_lift * firstShift(island) : 0.0);
   PetscCall(refill());
   PetscFunctionReturn(0);
 }
@@ -121,9 +122,11 @@ PetscErrorCode NewtonSolver::refill() {
                                        : system_.edge_metric ? system_.edge_metric[rod.slot(i)]
                                                              : 0);
         for (int i = 0; i < rod.vertices && vertex; ++i) vertex[i] += work_->shift[r] * work_->metric[a][rod.slot(i)];
+        for (const JoinedEdge &j : potential_->elements().joinedEdges({r, r + 1}))
+          if (vertex) vertex[j.frame - rod.first_slot] += work_->shift[r] * work_->metric[a][j.frame];
       }
     }
-    PetscCall(potential_->dofs().fillMatrix(blocks, jacobian_));
+    PetscCall(DofMap::fillMatrix(blocks, pattern_, jacobian_));
   }
   PetscCall(PetscLogEventEnd(events().fill, 0, 0, 0, 0));
   PetscFunctionReturn(0);
@@ -161,25 +164,31 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
   bool done = true, finite = true, lost = false;
   creeps_ = false;
   Residual &worst = report_.residual = {};
-  for (int r = rods_.begin; r < rods_.end; ++r) {
-    const RodRange &rod = potential_->elements().rods[r];
-    Residual &residual = work_->residual[r];
-    if (work_->active[r]) { // a rod that has converged takes no part any more
-      residual = potential_->residual(r, energyAtIterate(r));
-      // Obstacles go on with its moves; in statics from where forces nearly balance, for no inertia holds the rest.
-      const bool remain = potential_->obstaclesRemain(r),
-                 go = remain && (!potential_->step().isStatic() || excess(residual, rtol_obstacles) <= 1 ||
-                                 isAtNoise(residual, rtol_obstacles));
-      potential_->holdObstacles(r, remain && !go);
-      work_->moving[r] = (moving && dot(rod, work_->motion, work_->motion) > 0) || go;
-      finite = finite && residual.isFinite();
-      const Verdict verdict = residual.isFinite() && !work_->moving[r] && !remain ? judge(r, rtol) : Verdict::going;
+  for (const RodSet island : islands_) {
+    if (work_->active[island.begin]) { // what has converged takes no part any more
+      bool waits = false, moves = false, sound = true;
+      for (int r = island.begin; r < island.end; ++r) {
+        Residual &residual = work_->residual[r];
+        residual = potential_->residual(r, energyAtIterate(r));
+        // Obstacles go on with its moves; in statics from where forces nearly balance, for no inertia holds the rest.
+        const bool remain = potential_->obstaclesRemain(r),
+                   go = remain && (!potential_->step().isStatic() || excess(residual, rtol_obstacles) <= 1 ||
+                                   isAtNoise(residual, rtol_obstacles));
+        potential_->holdObstacles(r, remain && !go);
+        const RodRange &rod = potential_->elements().rods[r];
+        moves = moves || (moving && dot(rod, work_->motion, work_->motion) > 0) || go;
+        waits = waits || remain;
+        sound = sound && residual.isFinite();
+      }
+      fill(work_->moving, island, moves);
+      finite = finite && sound;
+      const Verdict verdict = sound && !moves && !waits ? judge(island, rtol) : Verdict::going;
       lost = lost || verdict == Verdict::lost;
       creeps_ = creeps_ || verdict == Verdict::saddle;
-      work_->active[r] = verdict != Verdict::answer;
-      done = done && !work_->active[r];
+      fill(work_->active, island, verdict != Verdict::answer);
+      done = done && verdict == Verdict::answer;
     }
-    worst.include(residual);
+    for (int r = island.begin; r < island.end; ++r) worst.include(work_->residual[r]);
   }
   report_.history.push_back(worst.force);
   watch().beat();
@@ -203,9 +212,10 @@ PetscErrorCode NewtonSolver::inertiaAtIterate(int *negative, double lift) {
   fill(work_->active, true);
   age_ = 0;
   PetscCall(assemble(jacobian_));
-  for (int r = rods_.begin; r < rods_.end && potential_->step().hessian != HessianKind::exact; ++r)
-    potential_->assembleRod(r, HessianKind::exact);
-  for (int r = rods_.begin; r < rods_.end; ++r) work_->shift[r] = lift * firstShift(r);
+  for (const RodSet island : islands_) {
+    if (potential_->step().hessian != HessianKind::exact) potential_->assemble(island, HessianKind::exact);
+    fill(work_->shift, island, lift * firstShift(island));
+  }
   PetscCall(refactor());
   PetscCall(readInertia(&regular));
   *negative = regular ? report_.negative_pivots : -1;

@@ -67,6 +67,7 @@ PetscErrorCode registerSolvers() {
   PetscFunctionBeginUser;
   PetscCall(SNESLineSearchRegister(line_search_name, createLineSearch));
   PetscCall(registerBanded());
+  PetscCall(registerCondensed());
   PetscFunctionReturn(0);
 }
 
@@ -78,7 +79,15 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
   rods_ = set;
   DofMap &dofs = potential.dofs();
   work_ = &work;
-  if (circulatory_.emplace(potential, set); circulatory_->isNone()) circulatory_.reset();
+  const bool joined = potential.dofs().isJoined(set);
+  islands_.clear();
+  for (int r = set.begin; r < set.end; ++r)
+    if (joined) { // all of a block that has junctions
+      islands_ = {set};
+      break;
+    } else
+      islands_.push_back({r, r + 1});
+  if (circulatory_.emplace(potential, islands_); circulatory_->isNone()) circulatory_.reset();
   system_ = {&dofs,        set,         &potential.blocks(), &work.metric,
              &work.active, &work.shift, &work.workspace,     potential.couplesPositions()};
   PetscCall(createSnes());
@@ -88,14 +97,14 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
   PetscBool cholesky;
   PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &cholesky));
   PetscCall(PCFactorGetMatSolverType(pc, &type));
-  banded_ = cholesky && type && std::string(type) == "banded";
+  banded_ = cholesky && type && (std::string(type) == "banded" || std::string(type) == "condensed");
   if (banded_) // factored straight from the band; every other solver gets a matrix of PETSc's own
     PetscCall(createBandedMatrix(&system_, jacobian_.out()));
   else
-    PetscCall(dofs.createMatrix(jacobian_.out(), potential.joinsPositions()));
+    PetscCall(dofs.createMatrix(set, potential.joinsPositions(), jacobian_.out(), &pattern_));
   PetscCall(SNESSetJacobian(snes_, jacobian_, jacobian_, jacobianCallback, this));
   if (type && std::string(type) == MATSOLVERMUMPS) PetscCall(askMumpsForInertia(pc, jacobian_));
-  if (!banded_ && (!cholesky || set.end - set.begin > 1)) {
+  if (!banded_ && (!cholesky || islands_.size() > 1)) {
     PetscCall(createBandedMatrix(&system_, band_.out()));
     PetscCall(KSPCreate(PETSC_COMM_SELF, inertia_.out()));
     PetscCall(KSPSetType(inertia_, KSPPREONLY));
@@ -135,8 +144,9 @@ PetscErrorCode NewtonSolver::createSnes() {
   PetscCall(KSPSetType(ksp, KSPPREONLY));
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(PCSetType(pc, PCCHOLESKY));
-  PetscCall(PCFactorSetMatSolverType(pc, "banded"));
-  PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGNATURAL));
+  const char *own = !dofs.isJoined(rods_) ? "banded" : canCondense(dofs, rods_) ? "condensed" : nullptr;
+  PetscCall(PCFactorSetMatSolverType(pc, own ? own : MATSOLVERMUMPS));
+  PetscCall(PCFactorSetMatOrderingType(pc, own ? MATORDERINGNATURAL : MATORDERINGEXTERNAL));
   PetscCall(PCFactorSetZeroPivot(
       pc, 1e-250)); // for PETSc's own: pivots have the units of a stiffness, no absolute bound makes sense
   PetscCall(SNESLineSearchSetPreCheck(search, directionCallback, this));

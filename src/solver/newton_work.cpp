@@ -16,6 +16,8 @@ Planes shiftMetric(const Elements &e, const DofMap &dofs) {
         metric[3][rod.slot(i)] =
             0.5 * (mass[rod.slot(i)] + mass[rod.slot((i + 1) % rod.vertices)]) * std::pow(length[rod.slot(i)], 2);
   }
+  for (const JoinedEdge &j : e.joinedEdges(dofs.all())) // as the twist of the edge
+    metric.setVector(0, j.frame, Vec3::Constant(metric[3][e.rods[j.rod].slot(j.edge)]));
   return metric;
 }
 
@@ -41,7 +43,7 @@ std::vector<double> edgeMetric(const IncrementalPotential &potential) {
 
 NewtonWork::NewtonWork(const IncrementalPotential &potential, int slots)
     : active(potential.all().end, true), shift(active.size(), 0), last_shift(shift), negative(active.size(), 0),
-      zero(negative), indefinite(active.size(), false), energy(active.size()), energy_known(active.size(), false),
+      zero(negative), indefinite(active.size(), false), tried(active.size()), energy(active.size()), energy_known(active.size(), false),
       residual(active.size()), moving(active.size(), false), standstill(active.size()), left(active.size(), 0),
       load_reach(active.size(), 0), load_energy(active.size(), 0), increment(slot_size, slots), coordinates(increment),
       trial(slots), motion(potential.dofs().makePlanes()), metric(shiftMetric(potential.elements(), potential.dofs())),

@@ -52,7 +52,8 @@ double forceScale(const Scene &scene, const Elements &elements, const Step &step
 
 Residual residualOf(const Elements &elements, const Material &m, const Step &step, const AxialLaw &axial,
                     const Configuration &iterate, const Planes &out_of_balance, const RodScale &scale, double reach,
-                    double steepness, const RodRange &rod) {
+                    double steepness, int index) {
+  const RodRange &rod = elements.rods[index];
   using std::abs;
   Pack forces(0.0), moments(0.0), tension(0.0), error(0.0);
   for (int s = rod.first_slot; s < rod.vertexEnd(); s += lanes) {
@@ -67,7 +68,9 @@ Residual residualOf(const Elements &elements, const Material &m, const Step &ste
     tension = max(tension, select(live, Pack(abs(force)), Pack(0.0)));
     error = max(error, select(live, Pack(abs(strain - force / read<Pack>(axial.stiffness() + s))), Pack(0.0)));
   }
-  const double force = reduce(forces), moment = reduce(moments);
+  double moment = reduce(moments);
+  for (const JoinedEdge &j : elements.joinedEdges({index, index + 1})) moment += out_of_balance.vector(0, j.frame).squaredNorm();
+  const double force = reduce(forces);
   // Edges carry errors of epsilon in their strains and directions, which the stiffnesses turn into forces and moments.
   const double strain_noise = edgeError(reach, scale.shortest_edge), count = std::sqrt(double(rod.vertices));
   const double bending = steepness *

@@ -15,21 +15,21 @@ PetscErrorCode copyValues(Vec from, std::vector<double> *values) {
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Secants::apply(const DofMap &dofs, RodSet rods, const std::function<PetscErrorCode(Vec, Vec)> &solve,
+PetscErrorCode Secants::apply(const DofMap &dofs, const std::vector<RodSet> &islands, const std::function<PetscErrorCode(Vec, Vec)> &solve,
                               Vec f, Vec work, Vec y) const {
   PetscFunctionBeginUser;
-  auto forRods = [&](auto visit) {
-    for (int r = rods.begin; r < rods.end; ++r) {
-      const PetscInt begin = dofs.firstUnknown({r, r + 1}) - dofs.firstUnknown(rods);
-      visit(r - rods.begin, begin, begin + dofs.unknowns({r, r + 1}));
+  auto forIslands = [&](auto visit) {
+    for (std::size_t n = 0; n < islands.size(); ++n) {
+      const PetscInt begin = dofs.firstUnknown(islands[n]) - dofs.firstUnknown(islands[0]);
+      visit(int(n), begin, begin + dofs.unknowns(islands[n]));
     }
   };
-  std::vector<std::vector<double>> share(pairs_.size(), std::vector<double>(rods.end - rods.begin));
+  std::vector<std::vector<double>> share(pairs_.size(), std::vector<double>(islands.size()));
   double *q;
   PetscCall(VecCopy(f, work));
   PetscCall(VecGetArray(work, &q));
   for (std::size_t k = pairs_.size(); k-- > 0;)
-    forRods([&](int r, PetscInt begin, PetscInt end) {
+    forIslands([&](int r, PetscInt begin, PetscInt end) {
       const Pair &secant = pairs_[k];
       double product = 0;
       for (PetscInt i = begin; i < end; ++i) product += secant.step[i] * q[i];
@@ -40,7 +40,7 @@ PetscErrorCode Secants::apply(const DofMap &dofs, RodSet rods, const std::functi
   PetscCall(solve(work, y));
   PetscCall(VecGetArray(y, &q));
   for (std::size_t k = 0; k < pairs_.size(); ++k)
-    forRods([&](int r, PetscInt begin, PetscInt end) {
+    forIslands([&](int r, PetscInt begin, PetscInt end) {
       const Pair &secant = pairs_[k];
       double product = 0;
       for (PetscInt i = begin; i < end; ++i) product += secant.change[i] * q[i];
@@ -51,17 +51,17 @@ PetscErrorCode Secants::apply(const DofMap &dofs, RodSet rods, const std::functi
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Secants::add(const DofMap &dofs, RodSet rods, Vec direction, const std::vector<double> &lengths,
+PetscErrorCode Secants::add(const DofMap &dofs, const std::vector<RodSet> &islands, Vec direction, const std::vector<double> &lengths,
                             const std::vector<double> &before, Vec f) {
   PetscFunctionBeginUser;
   Pair secant;
   PetscCall(copyValues(direction, &secant.step));
   PetscCall(copyValues(f, &secant.change));
   for (std::size_t i = 0; i < before.size(); ++i) secant.change[i] -= before[i];
-  for (int r = rods.begin; r < rods.end; ++r) {
-    const PetscInt begin = dofs.firstUnknown({r, r + 1}) - dofs.firstUnknown(rods),
-                   end = begin + dofs.unknowns({r, r + 1});
-    const double length = lengths[r - rods.begin];
+  for (std::size_t n = 0; n < islands.size(); ++n) {
+    const PetscInt begin = dofs.firstUnknown(islands[n]) - dofs.firstUnknown(islands[0]),
+                   end = begin + dofs.unknowns(islands[n]);
+    const double length = lengths[n];
     double product = 0, steps = 0, changes = 0;
     for (PetscInt i = begin; i < end; ++i) {
       secant.step[i] *= length;

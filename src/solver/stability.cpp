@@ -24,24 +24,31 @@ void NewtonSolver::beginMode(int start) {
       for (int a = 0; a < slot_size; ++a)
         if (dofs.unknown(rod.slot(i), a) >= 0)
           work_->increment[a][rod.slot(i)] = weight[start][a] * (1 + 0.5 * std::sin(1.7 * (slot_size * i + a)));
+    for (const JoinedEdge &j : dofs.joinedEdges({r, r + 1}))
+      work_->increment.setVector(0, j.frame, Vec3::Constant(weight[start][3]));
     dofs.copyBehindRing(rod, work_->increment);
   }
+  dofs.copyJoined(rods_, work_->increment);
 }
 
-/// A rod's share of the mass of the mode in work_->increment.
-double NewtonSolver::massOf(int r) const {
-  const RodRange &rod = potential_->elements().rods[r];
-  double mass = 0;
-  for (int a = 0; a < slot_size; ++a)
-    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
-      mass += work_->metric[a][s] * work_->increment[a][s] * work_->increment[a][s];
-  return mass;
+/// Product of the metric and a motion of some rods.
+void NewtonSolver::weigh(const Planes &motion, Planes &weighed) const {
+  const DofMap &dofs = potential_->dofs();
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    const RodRange &rod = dofs.rods()[r];
+    for (int a = 0; a < slot_size; ++a)
+      for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) weighed[a][s] = work_->metric[a][s] * motion[a][s];
+    for (const JoinedEdge &j : dofs.joinedEdges({r, r + 1}))
+      weighed.setVector(0, j.frame, work_->metric.vector(0, j.frame).cwiseProduct(motion.vector(0, j.frame)));
+  }
+  dofs.foldJoined(rods_, weighed);
 }
 
 /// Makes the mode in work_->increment one of unit mass; returns the root of the mass it had.
 double NewtonSolver::normaliseMode() {
-  double mass = 0;
-  for (int r = rods_.begin; r < rods_.end; ++r) mass += massOf(r);
+  Planes weighed = potential_->dofs().makePlanes();
+  weigh(work_->increment, weighed);
+  const double mass = potential_->dofs().dot(rods_, weighed, work_->increment);
   for (double &d : work_->increment) d /= std::sqrt(mass);
   return std::sqrt(mass);
 }
@@ -86,12 +93,7 @@ PetscErrorCode NewtonSolver::criticalMode(int stable, double *lift, Planes *mode
   for (int k = 0; k < iterations; ++k) {
     watch().beat();
     Planes right = potential_->dofs().makePlanes();
-    for (int r = rods_.begin; r < rods_.end; ++r) {
-      const RodRange &rod = potential_->elements().rods[r];
-      for (int a = 0; a < slot_size; ++a)
-        for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
-          right[a][s] = work_->metric[a][s] * work_->increment[a][s];
-    }
+    weigh(work_->increment, right);
     PetscCall(solveLinear(right, work_->increment));
     normaliseMode();
   }
@@ -108,6 +110,8 @@ PetscErrorCode NewtonSolver::criticalMode(int stable, double *lift, Planes *mode
         const double d = (*mode)[a][s] = work_->increment[a][s];
         if (a < 3 && std::abs(d) > std::abs(largest) * (1 + 1e-6)) largest = d;
       }
+    for (const JoinedEdge &j : potential_->dofs().joinedEdges({r, r + 1}))
+      mode->setVector(0, j.frame, work_->increment.vector(0, j.frame));
   }
   if (largest < 0)
     for (double &d : *mode) d = -d;
@@ -121,16 +125,16 @@ struct Probe {
   Planes motion, stiff, soft;
 };
 
-/// The combination of up to three probes with the largest quotient of v'(A - K)v and v'Av, rod by rod: a step of
+/// The combination of up to three probes with the largest quotient of v'(A - K)v and v'Av, island by island: a step of
 /// locally optimal conjugate gradients (Knyazev 2001) from `x` along `w`, and what the last step moved by, `p`. `x` has
 /// v'Av = 1 then.
-void improve(const RodRange &rod, const Probe &w, Probe &x, Probe &p, int count) {
+void improve(const DofMap &dofs, RodSet island, const Probe &w, Probe &x, Probe &p, int count) {
   const std::array<const Probe *, 3> basis{&w, &x, &p};
   Eigen::MatrixXd stiff(3, 3), soft(3, 3);
   for (int i = 0; i < count; ++i)
     for (int j = 0; j <= i; ++j) {
-      stiff(i, j) = stiff(j, i) = dot(rod, basis[i]->motion, basis[j]->stiff);
-      soft(i, j) = soft(j, i) = dot(rod, basis[i]->motion, basis[j]->soft);
+      stiff(i, j) = stiff(j, i) = dofs.dot(island, basis[i]->motion, basis[j]->stiff);
+      soft(i, j) = soft(j, i) = dofs.dot(island, basis[i]->motion, basis[j]->soft);
     }
   Eigen::Vector3d share = Eigen::Vector3d::Zero();
   for (bool independent = false; count > 0 && !independent;
@@ -144,12 +148,18 @@ void improve(const RodRange &rod, const Probe &w, Probe &x, Probe &p, int count)
     share.head(count) = scale.cwiseProduct(ritz.eigenvectors().col(count - 1));
   }
   auto combine = [&](Planes Probe::*part) {
-    for (int a = 0; a < slot_size; ++a) {
-      const double *along = (w.*part)[a];
-      double *here = (x.*part)[a], *last = (p.*part)[a];
-      for (int s = rod.first_slot; s < rod.vertexEnd() + 2; ++s) {
-        last[s] = share[0] * along[s] + share[2] * last[s];
-        here[s] = share[1] * here[s] + last[s];
+    for (int r = island.begin; r < island.end; ++r) {
+      const RodRange &rod = dofs.rods()[r];
+      for (int a = 0; a < slot_size; ++a) {
+        const double *along = (w.*part)[a];
+        double *here = (x.*part)[a], *last = (p.*part)[a];
+        auto combined = [&](int s) {
+          last[s] = share[0] * along[s] + share[2] * last[s];
+          here[s] = share[1] * here[s] + last[s];
+        };
+        for (int s = rod.first_slot; s < rod.vertexEnd() + 2; ++s) combined(s);
+        for (const JoinedEdge &j : dofs.joinedEdges({r, r + 1}))
+          if (a < 3) combined(j.frame);
       }
     }
   };
@@ -181,8 +191,7 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
   for (const Try way : {Try::buckling, Try::shifted, Try::shifted_anew}) {
     if (done) break;
     const bool buckling = way == Try::buckling;
-    for (int r = rods_.begin; r < rods_.end; ++r)
-      potential_->assembleRod(r, buckling ? HessianKind::uncompressed : HessianKind::exact);
+    potential_->assemble(rods_, buckling ? HessianKind::uncompressed : HessianKind::exact);
     EdgeBlocks softening = exact;
     if (buckling) {
       PetscCall(refactor());
@@ -203,11 +212,12 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
       for (int r = rods_.begin; r < rods_.end; ++r) {
         const RodRange &rod = e.rods[r];
         if (buckling)
-          softening.multiply(rod, v, y);
+          softening.multiply(rod, dofs.joinedEdges({r, r + 1}), v, y);
         else
-          addMetric(work_->metric, system_.edge_metric, rod, work_->shift[r], v, y);
+          addMetric(work_->metric, system_.edge_metric, rod, dofs.joinedEdges({r, r + 1}), work_->shift[r], v, y);
         dofs.fold(rod, y);
       }
+      dofs.foldJoined(rods_, y);
     };
     bool settled = false; // what more iterations would not change
     for (int start = 0; start < 2 && !done && (start == 0 || settled || definite); ++start) {
@@ -219,9 +229,9 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
       std::vector<double> before(neutral->size(), HUGE_VAL);
       settled = false;
       for (int k = 0; k < 100 && !settled; ++k) {
-        for (int r = rods_.begin; r < rods_.end && k > 0; ++r)
-          if (negative[r] > 0)
-            improve(e.rods[r], w, x, p,
+        for (std::size_t n = 0; n < islands_.size() && k > 0; ++n)
+          if (negative[islands_[n].begin] > 0)
+            improve(dofs, islands_[n], w, x, p,
                     start == 0 ? 1 : std::min(k, 3)); // first by inverse iteration, whose modes are smooth
         watch().beat();
         w.stiff = x.soft;
@@ -229,30 +239,36 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
         soften(w.motion, w.soft);
         done = settled = true;
         bool told = true; // of every rod, whether there is a way down
-        for (int r = rods_.begin; r < rods_.end; ++r) {
+        for (const RodSet island : islands_) {
+          const int r = island.begin;
           if (negative[r] == 0) continue;
-          const double stiffness = dot(e.rods[r], w.motion, w.stiff), softness = dot(e.rods[r], w.motion, w.soft);
-          const double noise = rounding * std::abs(stiffness) + hessianNoise(r, w.motion),
-                       change = softness - stiffness - before[r];
+          const double stiffness = dofs.dot(island, w.motion, w.stiff), softness = dofs.dot(island, w.motion, w.soft);
+          double noise = rounding * std::abs(stiffness);
+          for (int each = r; each < island.end; ++each) noise += hessianNoise(each, w.motion);
+          const double change = softness - stiffness - before[r];
           before[r] = softness - stiffness;
-          (*found)[r] = k >= enough && softness - stiffness > noise;
+          fill(*found, island, k >= enough && softness - stiffness > noise);
           // Compression that makes up for no mode's stiffness leaves a definite Hessian: its negative pivots are
           // rounding.
-          (*neutral)[r] = std::abs(softness - stiffness) <= noise || (definite && !(softness > 0.5 * stiffness));
+          fill(*neutral, island,
+               std::abs(softness - stiffness) <= noise || (definite && !(softness > 0.5 * stiffness)));
           settled = settled && ((*found)[r] || (k >= enough && std::abs(change) < 1e-3 * noise));
           done = done && (*found)[r];
           told = told && ((*found)[r] || (*neutral)[r]);
         }
         done = done || (settled && told);
       }
-      for (int r = rods_.begin; r < rods_.end; ++r)
+      for (int r = rods_.begin; r < rods_.end; ++r) {
         for (int a = 0; a < slot_size; ++a)
           std::copy(w.motion[a] + e.rods[r].first_slot, w.motion[a] + e.rods[r].vertexEnd() + 2,
                     work_->increment[a] + e.rods[r].first_slot);
+        for (const JoinedEdge &j : dofs.joinedEdges({r, r + 1}))
+          work_->increment.setVector(0, j.frame, w.motion.vector(0, j.frame));
+      }
     }
     done = done || definite || (settled && !buckling);
   }
-  for (int r = rods_.begin; r < rods_.end; ++r) potential_->assembleRod(r, potential_->step().hessian);
+  potential_->assemble(rods_, potential_->step().hessian);
   PetscFunctionReturn(0);
 }
 
@@ -267,27 +283,35 @@ PetscErrorCode NewtonSolver::escapeSaddle(bool *left, bool *neutral) {
   const std::vector<int> negative = work_->negative;
   PetscCall(findBucklingModes(&found, &neutral_rods));
   *neutral = true;
-  for (int r = rods_.begin; r < rods_.end; ++r) {
-    if (negative[r] > 0) *neutral = *neutral && neutral_rods[r];
-    if (!found[r]) continue;
-    const double turning = turningOf(r); // one unit: the edge that turns most turns by one radian
+  for (const RodSet island : islands_) {
+    if (negative[island.begin] > 0) *neutral = *neutral && neutral_rods[island.begin];
+    if (!found[island.begin]) continue;
+    double turning = 0; // one unit: the edge that turns most turns by one radian
+    for (int r = island.begin; r < island.end; ++r) turning = std::max(turning, turningOf(r));
     RetractionKind best_kind = RetractionKind::length;
-    double best = potential_->rodEnergy(potential_->iterate(), r).value, best_scale = 0;
+    double best = potential_->energy(potential_->iterate(), island), best_scale = 0;
+    auto possible = [&](double s, RetractionKind kind) {
+      for (int r = island.begin; r < island.end; ++r)
+        if (!potential_->tryMove(work_->increment, s, r, kind, work_->trial)) return false;
+      return true;
+    };
     for (const RetractionKind kind : {RetractionKind::length, RetractionKind::additive})
       for (double scale = 1e-6; scale < 2;
            scale *= 2) // just past a branching of a stiff rod the other branch is that close
         for (const double s : {scale / turning, -scale / turning}) {
-          if (!potential_->tryMove(work_->increment, s, r, kind, work_->trial)) continue;
-          const double energy = potential_->rodEnergy(work_->trial, r).value;
+          if (!possible(s, kind)) continue;
+          const double energy = potential_->energy(work_->trial, island);
           if (energy >= best) continue;
           best = energy;
           best_scale = s;
           best_kind = kind;
         }
     if (best_scale == 0) continue;
-    potential_->tryMove(work_->increment, best_scale, r, best_kind, work_->trial);
-    potential_->accept(work_->trial, r);
-    potential_->resetAxialForces(r);
+    possible(best_scale, best_kind);
+    for (int r = island.begin; r < island.end; ++r) {
+      potential_->accept(work_->trial, r);
+      potential_->resetAxialForces(r);
+    }
     *left = true;
   }
   if (!*left) PetscFunctionReturn(0);
@@ -338,9 +362,16 @@ PetscErrorCode NewtonSolver::settleMinimum(Seek seek, Outcome *now) {
     }
     const Scene &scene = potential_->scene();
     // Couples have no minimum to speak of. What friction at the surface holds may roll, and does so from rounding.
-    for (int r = rods_.begin; r < rods_.end && negative > 0; ++r)
-      if ((circulatory_ && circulatory_->acts(r)) || (scene.touches(r) && carriesSurface(scene.rods[r])))
-        negative -= std::exchange(work_->negative[r], 0);
+    auto rolls = [&](RodSet island) {
+      for (int r = island.begin; r < island.end; ++r)
+        if (scene.touches(r) && carriesSurface(scene.rods[r])) return true;
+      return circulatory_ && circulatory_->acts(island);
+    };
+    for (const RodSet island : islands_)
+      if (negative > 0 && rolls(island)) {
+        negative -= work_->negative[island.begin];
+        fill(work_->negative, island, 0);
+      }
     if (negative == 0) {
       PetscCall(settle(seek_, now));
       continue;

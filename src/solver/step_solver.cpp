@@ -8,18 +8,29 @@ namespace tendril {
 namespace {
 
 /// Cuts the scene into blocks of at least so many edges (about 2 kB each), and at least a pack of rods to factor
-/// together.
-std::vector<RodSet> blocksOf(const std::vector<RodRange> &rods) {
+/// together. An island of several rods is a block by itself.
+std::vector<RodSet> blocksOf(const DofMap &dofs) {
   constexpr int block_edges = 800;
+  const std::vector<RodRange> &rods = dofs.rods();
+  const int count = int(rods.size());
   std::vector<RodSet> blocks;
   int begin = 0, edges = 0;
-  for (int r = 0; r < int(rods.size()); ++r) {
-    edges += rods[r].edges;
-    if ((edges < block_edges || (r + 1 - begin) % lanes != 0) && edges < 4 * block_edges && r + 1 < int(rods.size()))
-      continue;
-    blocks.push_back({begin, r + 1});
-    begin = r + 1;
+  auto close = [&](int end) {
+    if (end > begin) blocks.push_back({begin, end});
+    begin = end;
     edges = 0;
+  };
+  for (int r = 0; r < count; ++r) {
+    const RodSet island = dofs.islandOf(r);
+    if (dofs.isJoined(island)) {
+      close(r);
+      close(island.end);
+      r = island.end - 1;
+      continue;
+    }
+    edges += rods[r].edges;
+    if ((edges < block_edges || (r + 1 - begin) % lanes != 0) && edges < 4 * block_edges && r + 1 < count) continue;
+    close(r + 1);
   }
   return blocks;
 }
@@ -30,16 +41,16 @@ PetscErrorCode StepSolver::setUp(IncrementalPotential &potential, Coupling coupl
   PetscFunctionBeginUser;
   potential_ = &potential;
   std::vector<RodSet> blocks;
-  if (coupling == Coupling::none) blocks = blocksOf(potential.elements().rods);
+  if (coupling == Coupling::none) blocks = blocksOf(potential.dofs());
   if (blocks.size() > 1) {
     PetscCall(setUpBlocks(blocks));
-    if (front().isBanded()) PetscFunctionReturn(0);
+    if (blocks_.size() == blocks.size()) PetscFunctionReturn(0);
   }
   PetscCall(setUpBlocks({potential.all()}));
   PetscFunctionReturn(0);
 }
 
-/// Stops after the first when it shows that another solver than `banded` was chosen, which needs the scene as one.
+/// Stops where another solver than `banded` was chosen for rods that nothing joins, which needs all of them as one.
 PetscErrorCode StepSolver::setUpBlocks(const std::vector<RodSet> &blocks) {
   PetscFunctionBeginUser;
   int slots = 0;
@@ -48,7 +59,7 @@ PetscErrorCode StepSolver::setUpBlocks(const std::vector<RodSet> &blocks) {
   work_.emplace(*potential_, slots);
   for (const RodSet &block : blocks) {
     PetscCall(blocks_.emplace_back().setUp(*potential_, *work_, block));
-    if (!front().isBanded()) break;
+    if (!blocks_.back().isBanded() && !potential_->dofs().isJoined(block)) break;
   }
   PetscFunctionReturn(0);
 }
@@ -84,7 +95,8 @@ PetscErrorCode StepSolver::solveBlock(NewtonSolver &block, const State &start, N
   constexpr int patience = 10;
   PetscFunctionBeginUser;
   const std::vector<RodRange> &rods = potential_->elements().rods;
-  const bool fine = std::any_of(rods.begin() + block.rods().begin, rods.begin() + block.rods().end,
+  const bool fine = !potential_->dofs().isJoined(block.rods()) &&
+                    std::any_of(rods.begin() + block.rods().begin, rods.begin() + block.rods().end,
                                 [](const RodRange &rod) { return rod.edges > fine_edges; });
   NewtonReport failed; // what tries took that led nowhere
   bool solved = false;

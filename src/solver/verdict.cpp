@@ -56,6 +56,7 @@ PetscErrorCode NewtonSolver::findLoadReach() {
   Derivatives loads(dofs.slots(rods_));
   loads.setOrigin(dofs.rods()[rods_.begin].first_slot);
   for (int r = rods_.begin; r < rods_.end; ++r) potential_->addLoads(r, loads);
+  dofs.foldJoined(rods_, loads.equilibrium);
   Planes response(slot_size, dofs.slots(rods_));
   response.setOrigin(loads.equilibrium.origin());
   PetscCall(solveLinear(loads.equilibrium, response));
@@ -88,7 +89,8 @@ bool NewtonSolver::isLittle(int r, double *size) {
 
 /// What rounding may change v'K v by, with K as it is assembled.
 double NewtonSolver::hessianNoise(int r, const Planes &v) const {
-  return 512 * epsilon * potential_->blocks().magnitude(potential_->elements().rods[r], v);
+  const Elements &e = potential_->elements();
+  return 512 * epsilon * potential_->blocks().magnitude(e.rods[r], e.joinedEdges({r, r + 1}), v);
 }
 
 /// Whether the last increment of a rod in statics costs no more energy than the rounding of its Hessian: a turn of a
@@ -136,6 +138,13 @@ NewtonSolver::Verdict NewtonSolver::judge(int r, double rtol) {
     return Verdict::answer; // for verify to judge
   lost_ = roundingMessage(r, size);
   return Verdict::lost;
+}
+
+/// An island is at an answer where all its rods are.
+NewtonSolver::Verdict NewtonSolver::judge(RodSet island, double rtol) {
+  Verdict worst = Verdict::answer;
+  for (int r = island.begin; r < island.end; ++r) worst = std::max(worst, judge(r, rtol));
+  return worst;
 }
 
 /// Whether the residual of a rod is below the tolerance, or at a noise that is little against the loads: what is asked
@@ -212,9 +221,10 @@ std::string NewtonSolver::farthest() {
 
 /// The first rod that is unstable in the Hessian factored last, in words.
 std::string NewtonSolver::unstableRod() const {
-  for (int r = rods_.begin; r < rods_.end; ++r)
-    if (const int count = work_->negative[r]; count > 0)
-      return "; " + labelOf(potential_->scene().rods[r]) + ": forces and moments are in balance, and " +
+  for (const RodSet island : islands_)
+    if (const int r = island.begin, count = work_->negative[r]; count > 0)
+      return "; " + labelOf(potential_->scene().rods[r]) +
+             (island.end > r + 1 ? " and " + std::to_string(island.end - r - 1) + " more" : "") + ": forces and moments are in balance, and " +
              std::to_string(count) + (count == 1 ? " motion lowers" : " motions lower") + " its energy";
   return "";
 }

@@ -1,5 +1,7 @@
 #include "tendril/state/commit.hpp"
 
+#include "tendril/geometry/rotation.hpp"
+
 namespace tendril {
 
 using C = Configuration;
@@ -17,6 +19,12 @@ using C = Configuration;
         state.position[rod.first_vertex + i][a] = high[i];
         state.position_low[rod.first_vertex + i][a] = low[i];
       }
+    }
+    for (const JoinedEdge &j : elements.joinedEdges({r, r + 1})) {
+      if (!j.isFirst()) continue;
+      const Mat3 turned = matrixOf(iterate.frameAt(j.frame)) * matrixOf(elements.frameAsDrawn(j)).transpose();
+      const Vec3 x = turned.col(0).normalized();
+      state.junction_axes[j.group] = {x, orthonormalised(Vec3(turned.col(1)), x)};
     }
     for (int i = 0; i < rod.edges; i += lanes) {
       const int slot = rod.slot(i), live = std::min(lanes, rod.edges - i);

@@ -64,6 +64,7 @@ State initialState(const Scene &scene, const Elements &elements) {
   s.twist_rate.assign(s.director.size(), 0.0);
   s.axial_force.assign(s.director.size(), 0.0);
   s.winding.assign(elements.cell_slot.size(), 0.0);
+  s.junction_axes.assign(elements.groups, {Vec3::UnitX(), Vec3::UnitY()});
   const Configuration c = configurationOf(s, scene, elements, 0);
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
     const Rod &rod = scene.rods[r];
@@ -106,6 +107,14 @@ void setTargets(const Scene &scene, const Elements &elements, double motion_time
     setTarget(scene.constraints[k], elements.constraint_slot[k], motion_time, c);
 }
 
+Frame joinedFrame(const State &state, const Elements &elements, const JoinedEdge &j) {
+  const auto &[x, y] = state.junction_axes[j.group];
+  Mat3 turned;
+  turned << x, y, x.cross(y);
+  const Frame &drawn = elements.frameAsDrawn(j);
+  return {turned * drawn.tangent, turned * drawn.director, 1};
+}
+
 [[gnu::flatten]] void setRod(const State &state, const Elements &elements, int r, Configuration &c) {
   using C = Configuration;
   using std::sqrt;
@@ -142,6 +151,11 @@ void setTargets(const Scene &scene, const Elements &elements, double motion_time
           axialStrain<Pack>(elements.energy[r], length, read<Pack>(elements.inverseRestLength() + s)));
   }
   c.closeRing(rod);
+  for (const JoinedEdge &j : elements.joinedEdges({r, r + 1})) {
+    c.setFrame(j.frame, joinedFrame(state, elements, j));
+    c.setPosition(j.frame, Vec3::Zero(), Vec3::Zero());
+    c[C::spin][j.frame] = 0;
+  }
   forCells(elements, r, [&]<class T>(const LooseCell &cell, int count) {
     const auto frames = cellFrames<T>(c, cell, count);
     write(c[C::twist] + cell.slot,

@@ -204,7 +204,7 @@ TEST(EdgeBlocks, MultiplyAsTheirDefinitionSays) {
     };
     each([&](int a, int s, PetscInt u) { x[a][s] = in[u]; });
     p.dofs.copyBehindRing(rod, x);
-    p.blocks.multiply(rod, x, y);
+    p.blocks.multiply(rod, {}, x, y);
     p.dofs.fold(rod, y);
     each([&](int a, int s, PetscInt u) { out[u] = y[a][s]; });
     EXPECT_LT((p.dense * in - out).norm(), 1e-13 * out.norm()) << shape;

@@ -23,7 +23,7 @@ inline void expectDerivatives(IncrementalPotential &potential, const Planes &v, 
   const RodRange &rod = potential.elements().rods[0];
   const double slope = dot(rod, potential.derivatives().gradient, v);
   Planes kv = potential.dofs().makePlanes();
-  potential.blocks().multiply(rod, v, kv);
+  potential.blocks().multiply(rod, {}, v, kv);
   const double curvature = dot(rod, kv, v);
   auto energy = [&](double part) {
     Configuration trial;

@@ -13,6 +13,12 @@ inline Mat3 matrixOf(const Frame &f) {
   return m;
 }
 
+/// Rotation by a vector: axis times angle.
+inline Mat3 rotationBy(const Vec3 &turn) {
+  const double angle = turn.norm();
+  return angle > 0 ? Mat3(Eigen::AngleAxisd(angle, turn / angle)) : Mat3(Mat3::Identity());
+}
+
 /// Rotation vector, of length up to pi, that turns one frame into the other, in space.
 inline Vec3 rotationBetween(const Frame &from, const Frame &to) {
   const Eigen::Quaterniond q(Mat3(matrixOf(to) * matrixOf(from).transpose()));

@@ -6,6 +6,7 @@
 #include "tendril/io/rod_names.hpp"
 #include "tendril/model/remesh.hpp"
 
+#include <map>
 #include <set>
 
 namespace tendril {
@@ -31,7 +32,8 @@ struct SceneFile {
   SceneSource source;
   RodNames names;
   std::set<std::string> constraint_names;
-  int constraint_blocks = 0;
+  int constraint_blocks = 0, junction_blocks = 0;
+  std::map<std::pair<int, int>, std::string> joined; ///< vertices in junctions, by rod and number: which
   std::vector<Drawing> drawings; ///< per rod
   RunSettings run;
   std::vector<std::string> notes; ///< to be told at the start: defaults of materials, and warnings

@@ -15,6 +15,7 @@
 #include "tendril/model/scene.hpp"
 
 #include <array>
+#include <span>
 
 namespace tendril {
 
@@ -30,19 +31,41 @@ public:
   /// Unknown of a slot's x, y, z (a = 0, 1, 2) or twist (3), or -1 where it is held or does not exist.
   PetscInt unknown(int slot, int a) const { return unknown_[std::size_t(slot_size) * slot + a]; }
   bool isHeld(int vertex) const { return held_[vertex]; }
+  /// Rods that junctions join, with all between them in the order of the scene; a rod that nothing joins is one by
+  /// itself.
+  RodSet islandOf(int rod) const { return islands_.empty() ? RodSet{rod, rod + 1} : islands_[rod]; }
+  bool isJoined(RodSet rods) const { return !joinedVertices(rods).empty(); }
+  /// Those of some rods, by rod.
+  std::span<const JoinedVertex> joinedVertices(RodSet rods) const { return joined_vertices_.of(rods); }
+  std::span<const JoinedEdge> joinedEdges(RodSet rods) const { return joined_edges_.of(rods); }
+  const ByRod<JoinedVertex> &joinedVertices() const { return joined_vertices_; }
+  const ByRod<JoinedEdge> &joinedEdges() const { return joined_edges_; }
+  int groups() const { return groups_; } ///< rigid ones of all junctions
   Planes makePlanes() const { return Planes(slot_size, slots_); }
 
   DM dm() const { return dm_; }
-  /// Matrix of PETSc's own type over the unknowns, preallocated for the blocks of every rod.
+  /// Entries of the matrix of some rods in its own order: where their values are in the blocks, those to be taken off
+  /// as their complement.
+  struct Pattern {
+    std::vector<std::ptrdiff_t> source;
+    std::vector<double> entries;
+  };
+  /// Matrix of PETSc's own type over the unknowns of some rods, preallocated for their blocks.
   /// \param joins as EdgeBlocks::joins
-  PetscErrorCode createMatrix(Mat *matrix, bool joins = false);
-  /// Puts the blocks of all rods into the matrix, both triangles.
-  PetscErrorCode fillMatrix(const EdgeBlocks &blocks, Mat matrix);
+  PetscErrorCode createMatrix(RodSet rods, bool joins, Mat *matrix, Pattern *pattern) const;
+  /// Puts their blocks into it, both triangles.
+  static PetscErrorCode fillMatrix(const EdgeBlocks &blocks, Pattern &pattern, Mat matrix);
 
   /// Copies of the first vertices and edge of a closed rod behind its last.
   void copyBehindRing(const RodRange &rod, Planes &increment) const;
   /// Adds what was summed into the copies behind a ring to the slots they stand for.
   void fold(const RodRange &rod, Planes &sums) const;
+  /// Positions of first members, and spins of first frames, to their copies in whole islands.
+  void copyJoined(RodSet islands, Planes &increment) const;
+  /// Adds what was summed into those copies to what they stand for.
+  void foldJoined(RodSet islands, Planes &sums) const;
+  /// Scalar product over the slots of an island. Of copies one of both must be zero.
+  double dot(RodSet island, const Planes &a, const Planes &b) const;
 
   /// Unknowns of some rods are numbered one after the other.
   PetscInt firstUnknown(RodSet rods) const { return unknown_begin_[rods.begin]; }
@@ -64,13 +87,15 @@ private:
   PetscInt unknowns_ = 0;
   std::vector<bool> held_;
   std::vector<PetscInt> unknown_, unknown_begin_;
-  /// Entries of the matrix in its own order: where their values are in the blocks, those to be taken off as their
-  /// complement.
-  std::vector<std::ptrdiff_t> source_;
-  std::vector<double> entries_;
+  ByRod<JoinedVertex> joined_vertices_;
+  ByRod<JoinedEdge> joined_edges_;
+  int groups_ = 0;
+  std::vector<RodSet> islands_;  ///< per rod; empty without junctions
+  std::vector<int> unknown_end_; ///< slot behind the last with unknowns, per rod
   OwnedDM dm_;
 
   PetscErrorCode createSection(PetscSection *section) const;
+  void join(const Scene &scene, std::vector<int> free_slots);
 };
 
 } // namespace tendril

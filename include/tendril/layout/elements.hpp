@@ -9,12 +9,13 @@
 
 namespace tendril {
 
-/// A cell that is not the one between the two edges at its slot: half cells of supports along a rod. Its constants have
-/// a slot of their own.
+/// A cell that is not the one between the two edges at its slot: half cells of supports along a rod, and of junctions.
+/// Its constants have a slot of their own.
 struct LooseCell {
   int slot;
   int frame0, frame1; ///< slots of the frames it joins
   int vertex;         ///< slot of the vertex in the middle of its unknowns
+  int turning = -1;   ///< which of the two frames, 0 or 1, is that of a junction; -1: none
 };
 
 /// Half of the end edge of an end that is free to turn, beyond all cells, where couples on that edge act at the end:
@@ -47,6 +48,7 @@ public:
   std::vector<int> vertex0, vertex1; ///< ends of each edge
   std::vector<int> vertex_slot, edge_slot, cell_slot;
   std::vector<int> rod_cells; ///< offsets of the rods' cells (nr + 1)
+  int groups;                 ///< of junctions, each with a frame
 
   // Over slots; zero where there is no such element, except rest lengths, which are one there.
   const double *mass() const { return constants_[0]; }              ///< of vertices [kg]
@@ -55,6 +57,8 @@ public:
   const double *axialStiffness() const { return constants_[3]; }    ///< [N]
   const double *twistMass() const { return constants_[4]; }         ///< r_L L of edges [kg m^2]
   const double *freedom() const { return constants_[5]; }           ///< 1 for vertices that are not held
+  /// 1 for vertices that are neither held nor in a junction.
+  const double *movable() const { return constants_[7]; }
   const double *cellLength() const { return constants_[6]; }        ///< Lbar [m]
   /// stiffness, 3 planes; rest, 3; weight, 2; free, 2; base, 1 (CellOf)
   const Planes &cells() const { return cells_; }
@@ -64,6 +68,9 @@ public:
   }
   const Pins &pinsOf(int rod) const { return pins_.empty() ? no_pins_ : pins_[rod]; }
   double length(int rod) const { return length_[rod]; } ///< at rest [m]
+  std::span<const JoinedEdge> joinedEdges(RodSet set) const { return joined_edges_.of(set); }
+  std::span<const JoinedVertex> joinedVertices(RodSet set) const { return joined_vertices_.of(set); }
+  const Frame &frameAsDrawn(const JoinedEdge &j) const { return joined_frame_[&j - joined_edges_.items.data()]; }
   int vertices() const { return int(vertex_slot.size()); }
   int edges() const { return int(edge_slot.size()); }
 
@@ -72,6 +79,9 @@ public:
 private:
   Planes constants_, cells_;
   std::vector<double> length_;                ///< per rod
+  ByRod<JoinedEdge> joined_edges_;
+  ByRod<JoinedVertex> joined_vertices_;
+  std::vector<Frame> joined_frame_; ///< as drawn, of unit length
   std::vector<std::vector<int>> constraints_; ///< per rod
   std::vector<Pins> pins_;                    ///< per rod
   Pins no_pins_;

@@ -4,7 +4,9 @@
 
 #include "tendril/geometry/planes.hpp"
 
+#include <algorithm>
 #include <array>
+#include <span>
 
 namespace tendril {
 
@@ -29,6 +31,41 @@ struct RodRange {
 /// Rods that follow each other in the scene, [begin, end).
 struct RodSet {
   int begin, end;
+};
+
+/// A list by rod; empty where no rod has any.
+template <class Item> struct ByRod {
+  std::vector<Item> items;
+  std::vector<int> begin; ///< per rod, and the end
+  std::span<const Item> of(RodSet rods) const {
+    if (items.empty()) return {};
+    return std::span(items).subspan(begin[rods.begin], begin[rods.end] - begin[rods.begin]);
+  }
+  void sort(std::size_t rods) {
+    std::stable_sort(items.begin(), items.end(), [](const Item &a, const Item &b) { return a.rod < b.rod; });
+    begin.assign(rods + 1, 0);
+    for (const Item &item : items) ++begin[item.rod + 1];
+    for (std::size_t r = 0; r < rods; ++r) begin[r + 1] += begin[r];
+  }
+};
+
+/// A vertex of a rod in a junction. The position of the first member is an unknown, those of the others are its copies.
+struct JoinedVertex {
+  int rod, vertex;
+  int slot, first_slot; ///< its own, and that of the first member
+  int junction;         ///< of the scene
+  bool isCopy() const { return slot != first_slot; }
+};
+
+/// An edge beside a vertex in a group of a junction, tied to the frame of the group by a half cell. The frame that the
+/// half cell sees is that of the edge as drawn, turned as the group has turned, at a slot of its own. Its spin stands
+/// there as a position does elsewhere: an unknown at the first edge of the group, of which the others have copies.
+struct JoinedEdge {
+  int rod, edge, vertex;
+  int cell, frame, first_frame; ///< slots
+  int group;                    ///< over all junctions
+  bool ends;                    ///< at that vertex, or else begins there
+  bool isFirst() const { return frame == first_frame; }
 };
 
 /// Unknowns of a slot: x, y, z, twist.

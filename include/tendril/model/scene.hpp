@@ -97,6 +97,18 @@ struct Constraint {
 };
 const char *nameOf(Constraint::Kind kind);
 
+/// Vertices of rods that are one point. Those of a group have one frame, too, a body without mass: every edge beside
+/// them is tied to it by a half cell, stress-free as drawn. The others turn freely, and their own rod runs through.
+struct Junction {
+  struct Member {
+    int rod, vertex;
+    int group; ///< from 0 on, or -1 for none
+  };
+  std::string name;
+  std::vector<Member> members;
+  int groups = 0;
+};
+
 /// Dead loads; torques act about the present tangent of their edge, moments are fixed in space.
 struct NodalForce {
   int rod, vertex;
@@ -112,6 +124,7 @@ struct Scene {
   std::vector<Rod> rods;
   std::vector<Support> supports;
   std::vector<Constraint> constraints;
+  std::vector<Junction> junctions;
   std::vector<NodalForce> forces;
   std::vector<EdgeMoment> moments;
   std::vector<Collider> colliders;

@@ -10,6 +10,8 @@
 
 #include "tendril/layout/dof_map.hpp"
 
+#include <numeric>
+
 namespace tendril {
 
 /// Memory for factors. Solvers that work one after the other may share it: a factor is lost when the next is made.
@@ -35,8 +37,8 @@ struct BandedSystem {
 
 /// y += scale x metric x v for one rod, copies behind a ring included in v and in y. `edges`: as
 /// BandedSystem::edge_metric.
-void addMetric(const Planes &metric, const double *edges, const RodRange &rod, double scale, const Planes &v,
-               Planes &y);
+void addMetric(const Planes &metric, const double *edges, const RodRange &rod, std::span<const JoinedEdge> joined,
+               double scale, const Planes &v, Planes &y);
 
 class BandedFactor {
 public:
@@ -46,6 +48,12 @@ public:
   /// By the unknowns of the rods; x may be b.
   void solve(const PetscScalar *b, PetscScalar *x);
 
+  static constexpr const char *name = "banded";
+  bool isRegular() const { return true; }
+  int negative() const { return std::accumulate(negative_.begin(), negative_.end(), 0); }
+  int zero() const { return std::accumulate(zero_.begin(), zero_.end(), 0); }
+  std::size_t numbers() const { return bytes_ / sizeof(double); }
+  PetscErrorCode view(PetscViewer viewer) const;
   RodSet rods() const { return rods_; }
   int negativePivots(int rod) const { return negative_[rod - rods_.begin]; }
   /// Pivots lost in rounding (|pivot| within a few epsilon of its diagonal): motions that cost no energy. A solve
@@ -76,8 +84,11 @@ private:
   template <class T> void solveGroup(const Group &group, const PetscScalar *b, PetscScalar *x);
 };
 
-/// Registers `-pc_factor_mat_solver_type banded`.
+/// Registers `-pc_factor_mat_solver_type banded`, and condensed (condensed.hpp).
 PetscErrorCode registerBanded();
+PetscErrorCode registerCondensed();
+/// Whether condensed can factor some rods.
+bool canCondense(const DofMap &dofs, RodSet rods);
 /// Matrix whose entries are those of `system`, which must outlive it; its Cholesky factorisation is `banded`. Increase
 /// its state (PetscObjectStateIncrease) when the values have changed.
 PetscErrorCode createBandedMatrix(BandedSystem *system, Mat *matrix);

@@ -22,10 +22,10 @@ namespace tendril {
 
 class Circulatory {
 public:
-  /// Of the couples on some rods.
-  Circulatory(const IncrementalPotential &potential, RodSet rods);
+  /// Of the couples on the rods of some islands.
+  Circulatory(const IncrementalPotential &potential, std::vector<RodSet> islands);
   bool isNone() const { return couples_.empty(); }
-  bool acts(int rod) const { return counts_[rod - rods_.begin] > 0; }
+  bool acts(RodSet island) const { return countOn(island) > 0; }
 
   /// Takes up the couples at the iterate, and the symmetric part of the Hessian there, which `solve` (right-hand side,
   /// solution) solves with.
@@ -44,13 +44,13 @@ private:
     void addTo(Planes &x) const;
   };
   const IncrementalPotential &potential_;
-  RodSet rods_;
+  std::vector<RodSet> islands_;
   std::vector<EdgeMoment> couples_; ///< by rod
-  std::vector<int> counts_;         ///< per rod
+  int countOn(RodSet island) const;
   std::vector<Column> columns_;     ///< two for each couple
   std::vector<double> strength_;    ///< half of |M| for each couple [N m]
-  Planes right_;                    ///< of the rods, as those solved
-  std::vector<Planes> solved_;      ///< the k-th columns of all rods, solved
+  Planes right_;                    ///< of the islands, as those solved
+  std::vector<Planes> solved_;      ///< the k-th columns of all islands, solved
 };
 
 } // namespace tendril

@@ -1,7 +1,7 @@
 #pragma once
 /// \file elimination.hpp
-/// The kernel of `banded`: LDL^T of one rod's matrix over edge variables, or of a pack of rods of one shape, one to a
-/// lane (docs/theory.md, Rounding).
+/// The kernel of `banded` and `condensed`: LDL^T of one rod's matrix over edge variables, or of a pack of rods of one
+/// shape, one to a lane (docs/theory.md, Rounding).
 
 #include "tendril/solver/pivots.hpp"
 
@@ -11,48 +11,97 @@ namespace tendril {
 
 /// The elimination of one rod, or of a pack of rods of one shape. `Read`: read(plane, i) gives an entry of the blocks
 /// at local slot i, shift included; those of positions with edges where it `joins`.
-template <class T, bool ring, bool joins, class Read> class Elimination {
+template <class T, Border border, bool joins, class Read> class Elimination {
 public:
-  Elimination(const RodRange &rod, const std::vector<char> &held, const Read &read, T *records)
-      : n_(rod.edges), last_(rod.vertices - 1), held_(held), read_(read), records_(records) {}
+  Elimination(const RunRange &run, const std::vector<char> &held, const Read &read, T *records)
+      : begin_(run.begin), n_(run.end), last_(ring ? n_ - 1 : n_), held_(held), read_(read), records_(records) {}
 
   /// \param first receives L and inverse pivots of the first vertex
   [[gnu::flatten]] void run(T *first) {
-    if (!ring && !held_[last_]) addVertex(last_, state_);
-    for (int i = n_ - 1; i > 0; --i) {
-      if (ring && i == last_)
-        closeRing();
-      else
-        step(i, nextHeld(i));
-    }
-    firstEdge();
-    using std::abs;
-    T a[3][3], scale[3];
-    for (int r = 0; r < 3; ++r) {
-      for (int c = r; c < 3; ++c) a[r][c] = state_[r][c];
-      scale[r] = abs(a[r][r]);
-    }
-    if (!held_[0])
-      factorSmall<3>(a, scale, first, first + 3, negative, zero);
-    else
-      std::fill_n(first, 6, T(0.0));
+    toFirstEdge();
+    factorVertex(first);
+    first[border_begin] = T(double(bordered_from_));
+  }
+
+  /// A run that begins without a separator. \param far what it does to the one at its end
+  [[gnu::flatten]] void run(T (&far)[state_size][state_size], T *first) {
+    run(first);
+    if (bordered) eliminateVertex(first);
+    corner(far);
+  }
+
+  /// A run that begins in a separator. \param near what it does to that one, to both, and to the one at its end
+  [[gnu::flatten]] void runTo(T (&near)[state_size][state_size], T (&between)[state_size][state_size],
+                              T (&far)[state_size][state_size], T *first) {
+    toFirstEdge();
+    for (int r = 0; r < state_size; ++r)
+      for (int c = 0; c < state_size; ++c) {
+        near[r][c] = state_[r][c];
+        between[r][c] = mixed_[r][c];
+      }
+    corner(far);
     first[border_begin] = T(double(bordered_from_));
   }
 
   T negative{0.0}, zero{0.0};
 
 private:
+  void corner(T (&far)[state_size][state_size]) const {
+    for (int r = 0; r < state_size; ++r)
+      for (int c = 0; c < state_size; ++c) far[r][c] = corner_[std::min(r, c)][std::max(r, c)];
+  }
+
+  void toFirstEdge() {
+    if (border == Border::none && !held_[last_]) addVertex(last_, state_);
+    for (int i = n_ - 1; i > begin_; --i) {
+      if (bordered && i == n_ - 1)
+        closeRing();
+      else
+        step(i, nextHeld(i));
+    }
+    firstEdge();
+  }
+
+  void factorVertex(T *first) {
+    using std::abs;
+    T a[3][3], scale[3];
+    for (int r = 0; r < 3; ++r) {
+      for (int c = r; c < 3; ++c) a[r][c] = state_[r][c];
+      scale[r] = abs(a[r][r]);
+    }
+    if (!held_[begin_])
+      factorSmall<3>(a, scale, first, first + 3, negative, zero);
+    else
+      std::fill_n(first, 6, T(0.0));
+  }
+
+  /// The first vertex with the border, whose rows of A^-1 B come behind the record of the vertex.
+  void eliminateVertex(T *first) {
+    for (int c = 0; c < state_size; ++c) {
+      T z[3];
+      for (int r = 0; r < 3; ++r) z[r] = held_[begin_] ? T(0.0) : mixed_[r][c];
+      if (!held_[begin_]) solveSmall<3>(first, first + 3, z);
+      for (int k = 0; k <= c; ++k) {
+        T share(0.0);
+        for (int r = 0; r < 3; ++r) share += mixed_[r][k] * z[r];
+        corner_[k].set(c, corner_[k][c] - share);
+      }
+      for (int r = 0; r < 3; ++r) first[vertex_record + r * state_size + c] = z[r];
+    }
+  }
+
+  static constexpr bool ring = border == Border::ring, bordered = border != Border::none;
   static constexpr int width = Record<T>::width;
-  const int n_, last_;
+  const int begin_, n_, last_;
   const std::vector<char> &held_;
   const Read &read_;
   T *const records_;
   Square<T> state_;
-  Square<T> mixed_, corner_; ///< of a ring: state with border, border with itself
+  Square<T> mixed_, corner_; ///< of a border: with the state, and with itself
   T first_mixed_{0.0};       ///< its largest entry so far
   int bordered_from_ = 0;    ///< edges before it have no border any more
 
-  T *record(int i) const { return records_ + std::size_t(i) * (ring ? Record<T>::bordered : Record<T>::plain); }
+  T *record(int i) const { return records_ + std::size_t(i - begin_) * (bordered ? Record<T>::bordered : Record<T>::plain); }
   bool nextHeld(int i) const { return held_[ring && i == last_ ? 0 : i + 1]; }
   T joined(int r, int c, int i) const { return read_(EdgeBlocks::joined(r, c), i); }
   T own(int r, int c, int i) const { return read_(EdgeBlocks::own(std::min(r, c), std::max(r, c)), i); }
@@ -87,7 +136,7 @@ private:
 #pragma GCC unroll 3
       for (int r = 0; r < 3; ++r) state_[edge_at + r].add(state_[r]);
     }
-    if (!ring || bordered_from_ > 0) return;
+    if (!bordered || bordered_from_ > 0) return;
     for (int r = 0; r < 3; ++r)
       if (held)
         mixed_[r] = {};
@@ -148,14 +197,14 @@ private:
 #pragma GCC unroll 7
       for (int k = 0; k < state_size; ++k) next[k].subtract(y[p][k], z[p], k);
     Row<T>::symmetrise(next);
-    if (ring && bordered_from_ == 0) {
+    if (bordered && bordered_from_ == 0) {
       Row<T> bs[edge_size];
       for (int r = 0; r < edge_size; ++r) {
         bs[r] = mixed_[edge_at + r];
         mixed_[edge_at + r] = {};
       }
       reduce(bs, l);
-      border(y, bs, d, l, out);
+      addBorder(y, bs, d, l, out);
       if (i % 8 == 0) dropBorder(i);
     }
     complete(z, l, out);
@@ -182,7 +231,7 @@ private:
   }
 
   /// What the elimination of an edge does to the border, given the reduced rows of the state and of the border.
-  void border(const T (&y)[edge_size][width], const Row<T> (&bs)[edge_size], const T *d, const T *l, T *out) {
+  void addBorder(const T (&y)[edge_size][width], const Row<T> (&bs)[edge_size], const T *d, const T *l, T *out) {
     Row<T> z[edge_size];
     for (int p = 0; p < edge_size; ++p) {
       T ys[width];
@@ -227,7 +276,7 @@ private:
     Row<T> b = across(3, i);
     for (int c = 0; c < 3; ++c) b.set(c, state_[twist][c] - (state_[twist][edge_at + c] + own(c, 3, i)));
     if constexpr (joins) joinSubstituted(i, next, b);
-    if constexpr (ring) {
+    if constexpr (bordered) {
       for (int r = 0; r < 3; ++r) mixed_[r].subtract(T(1.0), mixed_[edge_at + r]);
       for (int r = 0; r < 3; ++r) mixed_[edge_at + r] = {};
       const Row<T> bs = mixed_[twist];
@@ -256,7 +305,7 @@ private:
     for (int r = 0; r < 3; ++r) out[r * width + r] = T(1.0);
     z.store(out + 3 * width);
     out[Record<T>::pivots + 3] = inverse;
-    if constexpr (ring) {
+    if constexpr (bordered) {
       const Row<T> zs = bs.scaled(inverse);
       for (int k = 0; k < state_size; ++k) {
         mixed_[k].subtract(b[k], zs);
@@ -268,9 +317,10 @@ private:
     for (int k = 0; k < state_size; ++k) state_[k] = next[k];
   }
 
-  /// The last edge of a ring ends where the first begins, e = x_0 - x, and meets it in the cell behind the ring.
+  /// The last edge of a ring ends where the first begins, e = x_0 - x, and meets it in the cell behind the ring; that of
+  /// a run ends in a separator.
   void closeRing() {
-    const int i = last_;
+    const int i = n_ - 1;
     Square<T> next;
     Row<T> b = across(3, i), bs;
     for (int r = 0; r < 3; ++r) {
@@ -306,7 +356,8 @@ private:
 
   /// Behind it there is no edge, but in a ring the border joins in: it is this edge and its near vertex.
   void firstEdge() {
-    moveBack(nextHeld(0));
+    if (border == Border::separator && n_ - 1 == begin_) return closeRing();
+    moveBack(nextHeld(begin_));
     if constexpr (ring) {
       for (int r = 0; r < state_size; ++r)
         for (int c = r; c < state_size; ++c) {
@@ -316,7 +367,7 @@ private:
         }
       for (Row<T> &row : mixed_) row = {};
     }
-    nextHeld(0) ? substitute(0) : eliminate(0);
+    nextHeld(begin_) ? substitute(begin_) : eliminate(begin_);
   }
 };
 

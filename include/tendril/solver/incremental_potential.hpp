@@ -55,7 +55,9 @@ public:
   /// Increments that held vertices of some rods still have to make to reach their prescribed positions; zero elsewhere.
   /// True when there are any.
   bool remainingMotion(RodSet rods, Planes &increment) const {
-    return supports_.remaining(iterate_, step_.time, rods, increment);
+    const bool any = supports_.remaining(iterate_, step_.time, rods, increment);
+    dofs_.copyJoined(rods, increment);
+    return any;
   }
 
   /// Energy of a rod [J]; +inf where the configuration is impossible. Rounding blurs it by `noise`: differences below
@@ -65,6 +67,15 @@ public:
     double size = 0;                 ///< sum of the energies of all terms without their signs [J]
     double reach = 0, steepness = 1; ///< largest coordinate [m]; how much stiffer than at rest the steepest cell is
     double free = 1;                 ///< of a trial: part of the straight way to it on which no obstacle is
+    /// Adds that of another rod of an island.
+    void include(const RodEnergy &other) {
+      value += other.value;
+      noise += other.noise;
+      size += other.size;
+      reach = std::max(reach, other.reach);
+      steepness = std::max(steepness, other.steepness);
+      free = std::min(free, other.free);
+    }
   };
   RodEnergy rodEnergy(const Configuration &configuration, int rod) const;
   /// What a state of some rods stores, term by term. \param configuration that of the state
@@ -89,8 +100,8 @@ public:
     focus(all());
     return derivatives(all());
   }
-  /// Derivatives of one rod with another Hessian than the step's; they stay until the rod moves.
-  void assembleRod(int rod, HessianKind hessian);
+  /// Derivatives of whole islands with another Hessian than the step's; they stay until one of their rods moves.
+  void assemble(RodSet islands, HessianKind hessian);
   /// Whether any term couples the coordinates of one vertex.
   bool couplesPositions() const {
     return std::any_of(terms_.begin(), terms_.end(), [](const auto &term) { return term->couplesPositions(); });
@@ -123,6 +134,8 @@ public:
   /// Whether they go on with the moves of a rod, or wait for it.
   bool obstaclesGo(int rod) const { return obstaclesRemain(rod) && !obstacles_held_[rod]; }
   void holdObstacles(int rod, bool held) { obstacles_held_[rod] = held; }
+  /// Spins of the frames of junctions that follow the edges beside them: the mean of what an increment turns these by.
+  void turnFrames(RodSet islands, Planes &increment) const;
   /// The same for all rods.
   bool tryMove(const Planes &increment, double scale, Configuration &trial);
   /// Makes the trial of one rod, or of all, the iterate.
@@ -144,7 +157,7 @@ public:
   /// \param energy that of the iterate
   Residual residual(int rod, const RodEnergy &energy) {
     return residualOf(elements_, scene_.rods[rod].material, step_, axial_, iterate_, gradient(rod).equilibrium,
-                      scales_[rod], energy.reach, energy.steepness, elements_.rods[rod]);
+                      scales_[rod], energy.reach, energy.steepness, rod);
   }
   /// The largest of each over all rods.
   Residual residual();
@@ -178,6 +191,7 @@ public:
   }
   /// Of all, with the time; in steps in time the velocities are those of the stage.
   void commit(State &state) const;
+  RodSet islandOf(int rod) const { return dofs_.islandOf(rod); }
 
 private:
   const Scene &scene_;
@@ -197,12 +211,14 @@ private:
   RodSet focus_{0, 0};
   int workspace_slots_ = 0; ///< slots
   enum class Known : char { nothing, gradient, all };
-  std::vector<Known> known_; ///< per rod: what derivatives_ holds of the iterate
+  std::vector<Known> known_; ///< per island, at its first rod: what derivatives_ holds of the iterate
+  Known &known(int rod) { return known_[dofs_.islandOf(rod).begin]; }
   std::vector<RodScale> scales_;
 
   bool obstacles_move_;
   std::vector<char> obstacles_held_; ///< per rod
 
+  void assembleRod(int rod, HessianKind hessian);
   void moveObstacles(int rod);
   double freeFraction(const Configuration &from, const Configuration &to, int rod) const;
   double reachOf(const Configuration &configuration, const RodRange &rod) const;

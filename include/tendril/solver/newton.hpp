@@ -84,6 +84,7 @@ struct NewtonWork {
   std::vector<double> shift, last_shift; ///< of the diagonal of indefinite Hessians, now and when it was last needed
   std::vector<int> negative, zero;       ///< pivots
   std::vector<char> indefinite;          ///< rods whose Hessian gives no way down as it is
+  std::vector<IncrementalPotential::RodEnergy> tried;  ///< at the trial
   std::vector<IncrementalPotential::RodEnergy> energy; ///< at the iterate, ...
   std::vector<char> energy_known;                      ///< ... where it has been computed
   std::vector<Residual> residual;
@@ -100,7 +101,9 @@ struct NewtonWork {
   BandedWorkspace workspace;
 };
 
-/// Solves for some rods that nothing joins to others.
+/// Solves for some rods that nothing joins to others. Rods that junctions join are an island: they have one length of
+/// each step, one shift, one count of negative pivots and one verdict; what is kept of rods is the same for all of them
+/// then.
 class NewtonSolver {
 public:
   /// Creates SNES and its parts and reads -snes_*, -ksp_*, -pc_*, -mat_* options.
@@ -135,10 +138,12 @@ public:
 private:
   IncrementalPotential *potential_ = nullptr;
   RodSet rods_{0, 0};
+  std::vector<RodSet> islands_; ///< all or any of the rods
   OwnedSNES snes_;
   NewtonWork *work_ = nullptr;
   BandedSystem system_;
   OwnedMat jacobian_;
+  DofMap::Pattern pattern_; ///< of a matrix of PETSc's own
   bool banded_ = true;
   OwnedMat band_;    ///< where the solver that was chosen has no inertia of each rod: the same matrix once more, ...
   OwnedKSP inertia_; ///< ... factored by `banded`, which tells what is a minimum, and how far an iterate is from it
@@ -182,9 +187,11 @@ private:
   PetscErrorCode refill();
   PetscErrorCode refactor();
   PetscErrorCode makeDescent(Vec f, Vec y, bool regular);
+  void multiplyHessian(RodSet island, const Planes &x, Planes &y);
   PetscErrorCode findIndefinite(Vec y, bool regular, bool *any);
   PetscErrorCode shiftUntilPositive(bool regular);
   double firstShift(int rod) const;
+  double firstShift(RodSet island) const;
   PetscErrorCode includeMotion(Vec y);
   PetscErrorCode includeCirculation(bool *regular);
   /// What a line search goes by.
@@ -194,16 +201,18 @@ private:
     bool free = false;                      ///< whether the energy may rise
   };
   enum class Length { good, too_long, too_short };
-  IncrementalPotential::RodEnergy tryLength(int rod, double length);
-  Length judgeLength(int rod, double length, const Descent &descent, const IncrementalPotential::RodEnergy &there);
-  bool findLength(int rod, const Descent &descent, double *lambda, IncrementalPotential::RodEnergy *there);
-  bool standStill(int rod, double *lambda);
-  void goBeyond(int rod, const Descent &descent, double *lambda, IncrementalPotential::RodEnergy *there);
-  bool searchRod(int rod, double *lambda);
-  bool residualFalls(int rod, double length, const IncrementalPotential::RodEnergy &trial);
+  IncrementalPotential::RodEnergy tryLength(RodSet island, double length);
+  Length judgeLength(RodSet island, double length, const Descent &descent,
+                     const IncrementalPotential::RodEnergy &there);
+  bool findLength(RodSet island, const Descent &descent, double *lambda, IncrementalPotential::RodEnergy *there);
+  bool standStill(RodSet island, double *lambda);
+  void goBeyond(RodSet island, const Descent &descent, double *lambda, IncrementalPotential::RodEnergy *there);
+  bool search(RodSet island, double *lambda);
+  bool residualFalls(RodSet island, double length);
   bool sharesFactor() const;
-  enum class Verdict { going, answer, lost, saddle };
+  enum class Verdict { answer, going, saddle, lost }; ///< the worse the later
   Verdict judge(int rod, double rtol);
+  Verdict judge(RodSet island, double rtol);
   double sizeOf(int rod, const Planes &increment) const;
   double movedBy(int rod) const;
   bool isLittle(int rod, double *size);
@@ -217,7 +226,7 @@ private:
   std::string unstableRod() const;
   std::string roundingMessage(int rod, double size) const;
   void beginMode(int start);
-  double massOf(int r) const;
+  void weigh(const Planes &motion, Planes &weighed) const;
   double normaliseMode();
   double turningOf(int rod) const;
   PetscErrorCode findBucklingModes(std::vector<char> *found, std::vector<char> *neutral);
@@ -227,8 +236,9 @@ private:
   void forgetEnergies() { fill(work_->energy_known, false); }
   /// Moves what is shared with other blocks here.
   void focus();
-  template <class Value, class Same> void fill(std::vector<Value> &values, Same value) {
-    std::fill(values.begin() + rods_.begin, values.begin() + rods_.end, value);
+  template <class Value, class Same> void fill(std::vector<Value> &values, Same value) { fill(values, rods_, value); }
+  template <class Value, class Same> static void fill(std::vector<Value> &values, RodSet rods, Same value) {
+    std::fill(values.begin() + rods.begin, values.begin() + rods.end, value);
   }
 };
 

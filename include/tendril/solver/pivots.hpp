@@ -82,6 +82,14 @@ template <> struct Row<Pack> {
 /// A symmetric matrix over the state, or one of the state against a ring's border.
 template <class T> using Square = Row<T>[state_size];
 
+/// What the elimination of edges goes towards at their far end: nothing, the first vertex and edge of the same ring, or
+/// the vertex and the frame of a junction.
+enum class Border { none, ring, separator };
+/// Edges of a rod that are eliminated together, [begin, end).
+struct RunRange {
+  int begin, end;
+};
+
 /// What is kept of an edge to solve with: G = A^-1 B, where A is the edge's own matrix and B what it has with the
 /// state; L and the inverse pivots of A = L D L'. An edge whose far vertex is held is known from the position, e = -x:
 /// its pivots are zero and its rows of G say so.
@@ -93,8 +101,9 @@ template <class T> struct Record {
   static constexpr std::size_t of(const RodRange &rod) { return rod.closed ? bordered : plain; }
 };
 
-/// Numbers kept of the first vertex: L and inverse pivots of its position.
-inline constexpr std::size_t vertex_record = 8;
+/// Numbers kept of the first vertex: L and inverse pivots of its position. Where a run begins there and ends in a
+/// separator, A^-1 B for that comes behind.
+inline constexpr std::size_t vertex_record = 8, bordered_vertex_record = vertex_record + 24;
 /// ... and, of a ring, at which edge its border begins: those before have none.
 inline constexpr std::size_t border_begin = 6;
 

@@ -39,6 +39,6 @@ struct Residual {
 /// \param reach, steepness see IncrementalPotential::RodEnergy
 Residual residualOf(const Elements &elements, const Material &material, const Step &step, const AxialLaw &axial,
                     const Configuration &iterate, const Planes &out_of_balance, const RodScale &scale, double reach,
-                    double steepness, const RodRange &rod);
+                    double steepness, int rod);
 
 } // namespace tendril

@@ -36,6 +36,8 @@ struct State {
   std::vector<Vec3> velocity;      ///< (nv) [m/s]
   std::vector<double> twist_rate;  ///< (ne) [rad/s]
   std::vector<double> axial_force; ///< (ne) [N]
+  /// Rotation of the frame of each group of junctions since it was drawn: its first two columns.
+  std::vector<std::array<Vec3, 2>> junction_axes;
   std::vector<double>
       winding;        ///< (cells) 2 pi x whole turns of the twist angle, carried by continuity (`angle` measure) [rad]
   double last_dt = 0; ///< length of the step that led here; 0 where the integrator remembers nothing [s]
@@ -63,7 +65,7 @@ class Configuration {
 public:
   /// First planes of what is stored.
   enum Plane : int {
-    position = 0,
+    position = 0, ///< at the slot of a junction's frame: its spin since the step began, summed [rad]
     tangent = 3,
     director = 6,
     length = 9,
@@ -136,6 +138,9 @@ Configuration configurationOf(const State &state, const Scene &scene, const Elem
 /// Frames of all supports with the targets of all constraints, and all of one rod, into a configuration of that scene.
 void setSupports(const Scene &scene, const Elements &elements, double motion_time, Configuration &c);
 void setRod(const State &state, const Elements &elements, int rod, Configuration &c);
+
+/// Frame to which a half cell ties an edge, as its junction has turned.
+Frame joinedFrame(const State &state, const Elements &elements, const JoinedEdge &edge);
 
 /// Present frame of a support.
 Frame supportFrame(const Support &support, double motion_time);

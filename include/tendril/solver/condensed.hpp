@@ -1,0 +1,88 @@
+#pragma once
+/// \file condensed.hpp
+/// LDL^T of the Hessian of rods that junctions join. Junctions cut rods into runs. Each run is eliminated by the kernel
+/// of `banded`, towards the separator where it begins, with the one where it ends for a border; what is left is the
+/// Schur complement over the positions and frames of the junctions: dense for few unknowns, by LAPACK's symmetric
+/// indefinite factorisation (Bunch and Kaufman 1977), or sparse for many, by PETSc's Cholesky ordered by approximate
+/// minimum degree. Negative pivots of the runs and of the Schur complement add up to those of the whole (Haynsworth
+/// 1968). Registered with PETSc as the solver type `condensed` for Cholesky.
+
+#include "tendril/solver/banded.hpp"
+#include "tendril/solver/pivots.hpp"
+
+#include <memory>
+
+namespace tendril {
+
+/// A symmetric matrix over the separators: entries are added, then it is factored.
+class Schur {
+public:
+  virtual ~Schur() = default;
+  /// Takes the values for the entries that it was made with, in their order; those of one place add up.
+  /// \return whether it could be factored
+  virtual bool factor(const std::vector<double> &values) = 0;
+  virtual void solve(std::vector<double> &x) = 0;
+  virtual const char *kind() const = 0;
+  int negative = 0;
+};
+
+class CondensedFactor {
+public:
+  static constexpr const char *name = "condensed";
+  CondensedFactor(const DofMap &dofs, RodSet rods, BandedWorkspace &workspace);
+  /// Whether it can factor some rods: a rod that bends and runs through a junction without a frame it cannot.
+  static bool suits(const DofMap &dofs, RodSet rods);
+
+  void factor(const BandedSystem &system);
+  /// By the unknowns of the rods; x may be b.
+  void solve(const PetscScalar *b, PetscScalar *x);
+  bool isRegular() const { return regular_; }
+  int negative() const { return negative_; }
+  int zero() const { return zero_; }
+  std::size_t numbers() const { return records_.size(); }
+  std::size_t bytes() const { return (records_.size() + values_.size()) * sizeof(double); }
+  PetscErrorCode view(PetscViewer viewer) const;
+
+private:
+  using Places = std::array<int, state_size>; ///< among the separators' unknowns, or -1
+  /// Edges of a rod between two cuts.
+  struct Run {
+    int rod, begin, edges;
+    bool from_separator, to_separator;
+    Places near, far;
+    const JoinedEdge *near_frame = nullptr, *far_frame = nullptr; ///< to which its first and last edge are tied
+    std::vector<char> held; ///< of its vertices
+  };
+  /// Runs factored together, as in BandedFactor.
+  struct Group {
+    std::array<int, lanes> run;
+    int count;
+    bool packed;
+    std::size_t record, value; ///< where its factor and its values begin
+    std::array<int, lanes> entry; ///< where its part of the Schur complement begins
+  };
+  const DofMap &dofs_;
+  RodSet rods_;
+  BandedWorkspace &workspace_;
+  std::vector<Run> runs_;
+  std::vector<Group> groups_;
+  std::vector<int> unknown_; ///< of each separator's unknown, among those of the rods
+  AlignedVector records_, values_;
+  std::vector<double> entries_, separators_; ///< of the Schur complement; of a right-hand side or solution
+  std::size_t own_entries_ = 0;              ///< where those begin that separators have by themselves
+  std::unique_ptr<Schur> schur_;
+  bool regular_ = true;
+  int negative_ = 0, zero_ = 0;
+
+  void cut();
+  void group(std::vector<int> &rows, std::vector<int> &columns);
+  template <class T> void factorGroup(const Group &group, const BandedSystem &system);
+  template <class T> using Block = T[state_size][state_size];
+  template <class T>
+  void addEntries(const Group &group, const Block<T> &near, const Block<T> &between, const Block<T> &far);
+  template <class T> void solveTo(const Group &group, const PetscScalar *b);
+  template <class T> void solveFrom(const Group &group, PetscScalar *x);
+  template <class T, class Visit> void eachValue(const Group &group, Visit visit);
+};
+
+} // namespace tendril

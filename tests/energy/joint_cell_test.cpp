@@ -1,0 +1,63 @@
+/// Half cells to the frames of junctions against automatic differentiation.
+#include "tendril/energy/joint_cell.hpp"
+
+#include "support/random_cell.hpp"
+
+#include <gtest/gtest.h>
+
+namespace tendril::test {
+namespace {
+
+using D = Dual<7>;
+
+Vector3<D> asDual(const Vec3 &v) { return {D(v[0]), D(v[1]), D(v[2])}; }
+
+/// Turned by the first three variables as a rotation vector, up to second order.
+Vector3<D> turned(const Vec3 &v) {
+  const Vector3<D> spin(D::variable(0, 0), D::variable(0, 1), D::variable(0, 2));
+  const Vector3<D> once = spin.cross(asDual(v)), twice = spin.cross(once);
+  return asDual(v) + once + twice * D(0.5);
+}
+
+/// An edge whose vector changes by the next three variables, and whose twist by the last.
+FrameOf<D> moved(const Frame &f) {
+  Vector3<D> e;
+  for (int a = 0; a < 3; ++a) e[a] = D::variable(f.tangent[a] * f.length, 3 + a);
+  const D length = sqrt(e.squaredNorm());
+  const Vector3<D> t = e / length;
+  return {t, rotateAbout<D>(transport<D>(asDual(f.director), asDual(f.tangent), t), t, D::variable(0, 6)), length};
+}
+
+template <Measure measure> void expectMatch(RandomCell c, int frame) {
+  Frame &turns = frame == 0 ? c.f0 : c.f1;
+  turns.length = 1;
+  c.cell.weight[frame] = 0;
+  c.cell.free = {frame == 0 ? 0.0 : 1.0, frame == 0 ? 1.0 : 0.0}; // as cells have it; both turn all the same
+  const FrameOf<D> joint{turned(turns.tangent), turned(turns.director), D(1.0)}, edge = moved(frame == 0 ? c.f1 : c.f0);
+  const D exact =
+      frame == 0 ? cellEnergy<measure>(joint, edge, cast<D>(c.cell)) : cellEnergy<measure>(edge, joint, cast<D>(c.cell));
+  const JointCellDerivatives d = jointCellDerivatives<measure>(c.f0, c.f1, c.cell, frame);
+  Eigen::Matrix<double, 7, 1> gradient;
+  gradient << d.spin, d.edge;
+  Eigen::Matrix<double, 7, 7> hessian;
+  hessian << d.spin_spin, d.spin_edge, d.spin_edge.transpose(), d.edge_edge;
+  // As those of cells: rounding, times what a sharp fold makes of it.
+  EXPECT_LT((gradient - exact.g).norm(), 1e-10 * exact.g.norm());
+  EXPECT_LT((hessian - exact.h).norm(), 1e-10 * exact.h.norm());
+}
+
+TEST(JointCell, DerivativesMatchAutomaticDifferentiation) {
+  Random random(5);
+  for (const double fold : {0.0, 1e-6, 0.1, 1.0, 2.5})
+    for (int repeat = 0; repeat < 10; ++repeat)
+      for (const int frame : {0, 1}) {
+        const RandomCell seed = randomCell(random, fold);
+        for (const RandomCell &c : {seed, classical(seed)}) {
+          expectMatch<Measure::tan>(c, frame);
+          expectMatch<Measure::angle>(c, frame);
+        }
+      }
+}
+
+} // namespace
+} // namespace tendril::test
