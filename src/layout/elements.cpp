@@ -171,7 +171,7 @@ Elements::Elements(const Scene &scene, const DofMap &dofs)
       support_slot(scene.supports.size(), -1), rod_cells{0}, groups(dofs.groups()),
       joined_edges_(dofs.joinedEdges()), joined_vertices_(dofs.joinedVertices()) {
   std::vector<int> free_slots; ///< per rod, behind those of its supports
-  constants_ = Planes(8, slots);
+  constants_ = Planes(7, slots);
   joined_frame_.resize(joined_edges_.items.size());
   cells_ = Planes(cell_planes, slots);
   for (const int plane : {1, 2}) std::fill_n(constants_[plane], slots, 1.0);
@@ -183,9 +183,8 @@ Elements::Elements(const Scene &scene, const DofMap &dofs)
     energy.push_back(rod.energy);
     for (int v = 0; v < range.vertices; ++v) {
       vertex_slot.push_back(range.slot(v));
-      constants_[5][range.slot(v)] = constants_[7][range.slot(v)] = dofs.isHeld(range.first_vertex + v) ? 0 : 1;
+      constants_[5][range.slot(v)] = dofs.isHeld(range.first_vertex + v) ? 0 : 1;
     }
-    for (const JoinedVertex &j : joinedVertices({int(r), int(r) + 1})) constants_[7][j.slot] = 0;
     length_.push_back(rod.length());
     for (int i = 0; i < range.edges; ++i) {
       const double length = rod.edge(i).norm();

@@ -229,7 +229,29 @@ bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r,
     const double next = nextObstacleTime(r);
     trial.setObstacleTime(r, part == 1 ? next : now + part * (next - now));
   }
+  if (!elements_.joinedVertices({r, r + 1}).empty()) kind = RetractionKind::additive;
   if (!retraction_.apply(iterate_, increment, scale, r, kind, trial)) return false;
+  setTrialForces(increment, scale, r, kind, trial);
+  const double fraction = freeFraction(iterate_, trial, r);
+  if (free) *free = fraction;
+  return fraction == 1;
+}
+
+bool IncrementalPotential::tryMove(const Planes &increment, double scale, RodSet island, RetractionKind kind,
+                                   Configuration &trial, double *free) {
+  double least = 1;
+  bool possible = true;
+  for (int r = island.begin; r < island.end && possible; ++r) {
+    double of_rod = 1;
+    possible = tryMove(increment, scale, r, kind, trial, &of_rod) || of_rod < 1;
+    least = std::min(least, of_rod);
+  }
+  if (free) *free = least;
+  return possible && least == 1;
+}
+
+void IncrementalPotential::setTrialForces(const Planes &increment, double scale, int r, RetractionKind kind,
+                                          Configuration &trial) const {
   const RodRange &rod = elements_.rods[r];
   const Energy energy = elements_.energy[r];
   for (int i = rod.first_slot; i < rod.edgeEnd(); i += lanes) {
@@ -254,9 +276,24 @@ bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r,
         read<Pack>(iterate_[C::strain] + i) + change * inverse * strainSlope<Pack>(energy, length, inverse);
     write(trial[C::axial_force] + i, Pack(force + Pack(scale) * (stiffness * (strain - rest) - force)));
   }
-  const double fraction = freeFraction(iterate_, trial, r);
-  if (free) *free = fraction;
-  return fraction == 1;
+}
+
+double IncrementalPotential::addExcess(const Planes &increment, double scale, const Configuration &trial, int r,
+                                       Planes &force) const {
+  const RodRange &rod = elements_.rods[r];
+  double most = 0;
+  for (int i = rod.first_slot; i < rod.edgeEnd(); ++i) {
+    const Frame before = iterate_.frameAt(i), now = trial.frameAt(i);
+    const Vec3 de = increment.vector(0, i + 1) - increment.vector(0, i);
+    const double inverse = elements_.inverseRestLength()[i],
+                 excess = now.length - (before.length + scale * before.tangent.dot(de)),
+                 slope = before.length * inverse * strainSlope(elements_.energy[r], before.length, inverse);
+    const Vec3 pull = axial_.stiffness()[i] / inverse * slope * slope * excess * before.tangent;
+    force.setVector(0, i, force.vector(0, i) - pull);
+    force.setVector(0, i + 1, force.vector(0, i + 1) + pull);
+    most = std::max(most, std::abs(excess) * inverse);
+  }
+  return most;
 }
 
 void IncrementalPotential::turnFrames(RodSet islands, Planes &increment) const {
@@ -276,8 +313,8 @@ void IncrementalPotential::turnFrames(RodSet islands, Planes &increment) const {
 }
 
 bool IncrementalPotential::tryMove(const Planes &increment, double scale, Configuration &trial) {
-  for (int r = 0; r < all().end; ++r)
-    if (!tryMove(increment, scale, r, trial)) return false;
+  for (int r = 0; r < all().end; r = islandOf(r).end)
+    if (!tryMove(increment, scale, islandOf(r), settings.retraction, trial)) return false;
   return true;
 }
 

@@ -39,23 +39,66 @@ bool NewtonSolver::residualFalls(RodSet island, double length) {
   return finite && (size <= (1 - sufficient * length) * size_before || answer);
 }
 
+/// Trial of joined rods at a length of their increment. Going straight, edges get longer by squares, which stiff ones
+/// must not: the factored Hessian takes that back, as a second-order correction does for constraints (Nocedal and Wright
+/// 2006, 18.3), wherever the rods are joined and held. False where it is impossible.
+bool NewtonSolver::tryCorrected(RodSet island, double length, double *free) {
+  constexpr int sweeps = 2;
+  constexpr double little = 1e-12; // of an edge
+  const DofMap &dofs = potential_->dofs();
+  Planes &step = work_->corrected, &response = work_->response;
+  if (step.size() == 0) step = response = potential_->dofs().makePlanes();
+  auto each = [&](auto visit) { // slots with unknowns
+    for (int r = island.begin; r < island.end; ++r) {
+      const RodRange &rod = dofs.rods()[r];
+      for (int s = rod.first_slot; s < rod.vertexEnd() + (rod.closed ? 2 : 0); ++s) visit(s);
+      for (const JoinedEdge &j : dofs.joinedEdges({r, r + 1})) visit(j.frame);
+    }
+  };
+  each([&](int s) {
+    for (int a = 0; a < slot_size; ++a) step[a][s] = length * work_->increment[a][s];
+  });
+  for (int sweep = 0;; ++sweep) {
+    const bool possible = potential_->tryMove(step, 1, island, RetractionKind::additive, work_->trial, free);
+    for (int r = island.begin; r < island.end && possible; ++r)
+      potential_->setTrialForces(work_->increment, length, r, RetractionKind::length, work_->trial);
+    if (!possible || sweep == sweeps) return possible;
+    each([&](int s) { response.setVector(0, s, Vec3::Zero()), response[3][s] = 0; });
+    double most = 0;
+    for (int r = island.begin; r < island.end; ++r) {
+      most = std::max(most, potential_->addExcess(work_->increment, length, work_->trial, r, response));
+      dofs.fold(dofs.rods()[r], response);
+    }
+    dofs.foldJoined(island, response);
+    if (most < little) return true;
+    if (solveLinear(response, response)) return true;
+    each([&](int s) {
+      for (int a = 0; a < slot_size; ++a) step[a][s] -= response[a][s];
+    });
+  }
+}
+
 /// Trial of an island at a length of its increment, and its energy: sums over its rods.
 IncrementalPotential::RodEnergy NewtonSolver::tryLength(RodSet island, double length) {
   IncrementalPotential::RodEnergy sum{0, 0};
   sum.steepness = 0;
+  report_.trials += island.end - island.begin;
+  (void)PetscLogEventBegin(events().configuration, 0, 0, 0, 0);
+  double free = 1;
+  const RetractionKind kind = potential_->settings.retraction;
+  const bool corrects = kind == RetractionKind::length &&
+                        potential_->dofs().isJoined(island),
+             possible = corrects ? tryCorrected(island, length, &free)
+                                 : potential_->tryMove(work_->increment, length, island, kind, work_->trial, &free);
+  (void)PetscLogEventEnd(events().configuration, 0, 0, 0, 0);
+  (void)PetscLogEventBegin(events().energy, 0, 0, 0, 0);
   for (int r = island.begin; r < island.end; ++r) {
-    ++report_.trials;
-    (void)PetscLogEventBegin(events().configuration, 0, 0, 0, 0);
-    double free = 1;
-    const bool possible = potential_->tryMove(work_->increment, length, r, work_->trial, &free);
-    (void)PetscLogEventEnd(events().configuration, 0, 0, 0, 0);
-    (void)PetscLogEventBegin(events().energy, 0, 0, 0, 0);
     IncrementalPotential::RodEnergy &energy = work_->tried[r];
     energy = possible ? potential_->rodEnergy(work_->trial, r) : IncrementalPotential::RodEnergy{};
-    energy.free = free;
     sum.include(energy);
-    (void)PetscLogEventEnd(events().energy, 0, 0, 0, 0);
   }
+  sum.free = free;
+  (void)PetscLogEventEnd(events().energy, 0, 0, 0, 0);
   return sum;
 }
 
@@ -242,11 +285,8 @@ void NewtonSolver::predict() {
       dofs.copyBehindRing(rod, work_->increment);
     }
     potential_->turnFrames(island, work_->increment);
-    bool possible = true;
+    if (!potential_->tryMove(work_->increment, 1, island, kind, work_->trial)) continue;
     double before = 0, after = 0;
-    for (int r = island.begin; r < island.end && possible; ++r)
-      possible = potential_->tryMove(work_->increment, 1, r, kind, work_->trial);
-    if (!possible) continue;
     for (int r = island.begin; r < island.end; ++r) {
       work_->tried[r] = potential_->rodEnergy(work_->trial, r);
       after += work_->tried[r].value;

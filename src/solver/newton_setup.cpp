@@ -97,7 +97,12 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
   PetscBool cholesky;
   PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &cholesky));
   PetscCall(PCFactorGetMatSolverType(pc, &type));
-  banded_ = cholesky && type && (std::string(type) == "banded" || std::string(type) == "condensed");
+  const std::string chosen = type ? type : "";
+  banded_ = cholesky && (chosen == "banded" || chosen == "condensed");
+  PetscCheck(!(joined && chosen == "banded") && !(chosen == "condensed" && !canCondense(dofs, set)), PETSC_COMM_SELF,
+             PETSC_ERR_SUP, "option -pc_factor_mat_solver_type: %s is for rods that %s", type,
+             joined && chosen == "banded" ? "nothing joins; take condensed, mumps or petsc"
+                                          : "do not bend where they run through junctions; take mumps or petsc");
   if (banded_) // factored straight from the band; every other solver gets a matrix of PETSc's own
     PetscCall(createBandedMatrix(&system_, jacobian_.out()));
   else
@@ -110,7 +115,10 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
     PetscCall(KSPSetType(inertia_, KSPPREONLY));
     PetscCall(KSPGetPC(inertia_, &pc));
     PetscCall(PCSetType(pc, PCCHOLESKY));
-    PetscCall(PCFactorSetMatSolverType(pc, "banded"));
+    PetscCheck(!joined || canCondense(dofs, set), PETSC_COMM_SELF, PETSC_ERR_SUP,
+               "option -ksp_type, -pc_type: rods run through junctions, and what tells a minimum is a factorisation; "
+               "take -pc_type cholesky");
+    PetscCall(PCFactorSetMatSolverType(pc, joined ? "condensed" : "banded"));
     PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGNATURAL));
   }
   PetscFunctionReturn(0);

@@ -291,9 +291,7 @@ PetscErrorCode NewtonSolver::escapeSaddle(bool *left, bool *neutral) {
     RetractionKind best_kind = RetractionKind::length;
     double best = potential_->energy(potential_->iterate(), island), best_scale = 0;
     auto possible = [&](double s, RetractionKind kind) {
-      for (int r = island.begin; r < island.end; ++r)
-        if (!potential_->tryMove(work_->increment, s, r, kind, work_->trial)) return false;
-      return true;
+      return potential_->tryMove(work_->increment, s, island, kind, work_->trial);
     };
     for (const RetractionKind kind : {RetractionKind::length, RetractionKind::additive})
       for (double scale = 1e-6; scale < 2;

@@ -40,7 +40,7 @@ void Retraction::setInverseTimeSquared(double value) {
         soft[rod.slot(v)] +=
             1e-8 * elements_.axialStiffness()[rod.slot(i)] * elements_.inverseRestLength()[rod.slot(i)];
     for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)
-      soft[s] = elements_.movable()[s] / (soft[s] + elements_.mass()[s] * value);
+      soft[s] = elements_.freedom()[s] / (soft[s] + elements_.mass()[s] * value);
     stiffenNearHeld(rod, elements_.pinsOf(int(&rod - elements_.rods.data())));
   }
 }
@@ -51,11 +51,11 @@ void Retraction::setInverseTimeSquared(double value) {
 /// f, q linear from one to the other.
 void Retraction::stiffenNearHeld(const RodRange &rod, const Elements::Pins &pins) {
   double *soft = work_[softness];
-  const double *movable = elements_.movable(), *length = elements_.restLength();
+  const double *freedom = elements_.freedom(), *length = elements_.restLength();
   std::vector<std::pair<int, double>> held; // with q
   auto pin = pins.begin();
   for (int i = 0; i < rod.vertices; ++i) {
-    if (movable[rod.slot(i)] == 0) held.emplace_back(i, 0.0);
+    if (freedom[rod.slot(i)] == 0) held.emplace_back(i, 0.0);
     if (pin == pins.end() || pin->first != rod.slot(i)) continue;
     const double softer = 1 / (1 + soft[rod.slot(i)] * (pin++)->second);
     held.emplace_back(i, softer);
@@ -166,10 +166,10 @@ static void moveAll(const RodRange &rod, const Vec3 &by, C &to) {
   const RodRange &rod = elements_.rods[r];
   if (!aim(from, rod, kind, to)) return false;
   const int begin = rod.first_slot, end = rod.edgeEnd(); // end vertices of an open rod
-  const double *movable = elements_.movable();
-  int first = -1, last = -1; // vertices of the rod that are held or joined
+  const double *freedom = elements_.freedom();
+  int first = -1, last = -1; // held vertices of the rod
   for (int s = begin; s < rod.vertexEnd(); ++s)
-    if (movable[s] == 0) {
+    if (freedom[s] == 0) {
       if (first < 0) first = s;
       last = s;
     }
@@ -193,7 +193,7 @@ static void moveAll(const RodRange &rod, const Vec3 &by, C &to) {
   moveAll(rod, Vec3::Zero(), to);
   for (int s = low; s < high;) {
     int next = s + 1;
-    while (next < high && movable[next] != 0) ++next;
+    while (next < high && freedom[next] != 0) ++next;
     if (next > s + 1) projectSpan(rod, s, next, to);
     s = next;
   }

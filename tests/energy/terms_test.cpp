@@ -221,7 +221,7 @@ TEST(EveryTerm, HasTheDerivativeOfItsForces) {
       EXPECT_PETSC(bench.sim.solver.inertiaAtIterate(&negative));
       EXPECT_EQ(negative, 0);
       NewtonSolver &solver = bench.sim.solver.front();
-      Circulatory circulatory(bench.potential(), bench.potential().all());
+      Circulatory circulatory(bench.potential(), {bench.potential().all()});
       if (!circulatory.isNone()) {
         EXPECT_PETSC(circulatory.update([&](const Planes &r, Planes &x) { return solver.solveLinear(r, x); }));
       }

@@ -57,8 +57,6 @@ public:
   const double *axialStiffness() const { return constants_[3]; }    ///< [N]
   const double *twistMass() const { return constants_[4]; }         ///< r_L L of edges [kg m^2]
   const double *freedom() const { return constants_[5]; }           ///< 1 for vertices that are not held
-  /// 1 for vertices that are neither held nor in a junction.
-  const double *movable() const { return constants_[7]; }
   const double *cellLength() const { return constants_[6]; }        ///< Lbar [m]
   /// stiffness, 3 planes; rest, 3; weight, 2; free, 2; base, 1 (CellOf)
   const Planes &cells() const { return cells_; }

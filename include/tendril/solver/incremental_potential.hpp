@@ -120,6 +120,9 @@ public:
   bool tryMove(const Planes &increment, double scale, int rod, Configuration &trial, double *free = nullptr) {
     return tryMove(increment, scale, rod, settings.retraction, trial, free);
   }
+  /// The same for all rods of an island.
+  bool tryMove(const Planes &increment, double scale, RodSet island, RetractionKind kind, Configuration &trial,
+               double *free = nullptr);
   /// Adds what their way to those does to the gradient, to first order.
   void addObstacleMotion(int rod, Planes &out) const {
     for (const auto &term : terms_) term->addObstacleMotion(iterate_, nextObstacleTime(rod), rod, out);
@@ -134,6 +137,11 @@ public:
   /// Whether they go on with the moves of a rod, or wait for it.
   bool obstaclesGo(int rod) const { return obstaclesRemain(rod) && !obstacles_held_[rod]; }
   void holdObstacles(int rod, bool held) { obstacles_held_[rod] = held; }
+  /// Axial forces of a trial, those that the linearised strains of an increment ask for.
+  void setTrialForces(const Planes &increment, double scale, int rod, RetractionKind kind, Configuration &trial) const;
+  /// Adds the forces of edges that a trial has made longer than an increment does to first order.
+  /// \return by how much at most, over their lengths
+  double addExcess(const Planes &increment, double scale, const Configuration &trial, int rod, Planes &force) const;
   /// Spins of the frames of junctions that follow the edges beside them: the mean of what an increment turns these by.
   void turnFrames(RodSet islands, Planes &increment) const;
   /// The same for all rods.

@@ -94,7 +94,8 @@ struct NewtonWork {
       left; ///< of the answer, over the rod's length: what Newton would still move it by; 0 where the tolerance was met
   std::vector<double> load_reach,
       load_energy; ///< what the loads would move, and the energy of that [J]; not a number where not known
-  Planes increment, coordinates; ///< work arrays
+  Planes increment, coordinates; ///< work arrays, ...
+  Planes corrected, response;    ///< ... where junctions are
   Configuration trial, kept;     ///< `kept`: the iterate while another is tried in its place
   Planes motion, metric;
   std::vector<double> edge_metric; ///< per slot
@@ -202,6 +203,7 @@ private:
   };
   enum class Length { good, too_long, too_short };
   IncrementalPotential::RodEnergy tryLength(RodSet island, double length);
+  bool tryCorrected(RodSet island, double length, double *free);
   Length judgeLength(RodSet island, double length, const Descent &descent,
                      const IncrementalPotential::RodEnergy &there);
   bool findLength(RodSet island, const Descent &descent, double *lambda, IncrementalPotential::RodEnergy *there);

@@ -22,7 +22,8 @@ public:
 
   /// Writes rod `r` of `to` = R(from, scale * increment), all but its axial force. Directors are carried by the minimal
   /// rotation between tangents and turned by the twist increments. False when an edge vanishes or turns back on itself.
-  /// \param increment x, y, z and twist of every slot, copies behind rings included
+  /// Of joined rods only `additive`: their lengths hang together.
+  /// \param increment x, y, z and twist of every slot, copies behind rings included, and spins of junctions' frames
   bool apply(const Configuration &from, const Planes &increment, double scale, int rod, RetractionKind kind,
              Configuration &to);
 
