@@ -129,7 +129,11 @@ void readJunction(const YamlValue &value, SceneFile &out) {
     Junction junction;
     junction.name = listed ? name : name + "#" + std::to_string(k);
     junction.members = std::move(points[k]);
-    if (junction.members.size() < 2) value.fail("a junction needs two 'members' or more, found 1");
+    if (junction.members.empty()) map.at("junctions[].members").fail("'members' is empty; a junction needs two or more");
+    const Junction::Member &only = junction.members.front();
+    if (junction.members.size() < 2 && !(rigid && scene.rods[only.rod].edgeBefore(only.vertex) >= 0 &&
+                                         scene.rods[only.rod].edgeAfter(only.vertex) >= 0))
+      value.fail("a junction needs two 'members' or more, or as a corner one along its rod with 'type: rigid'");
     for (Junction::Member &m : junction.members) {
       if (rigid && m.group >= 0)
         map.at("junctions[].members").fail("'group' is for 'type: ball'; all members of a rigid junction are one");

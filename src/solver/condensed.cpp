@@ -237,7 +237,8 @@ void CondensedFactor::group(std::vector<int> &rows, std::vector<int> &columns) {
     g.record = records;
     g.value = values;
     records += wide * (bordered_vertex_record + one.edges * std::size_t(packed ? perEdge(Pack()) : perEdge(0.0)));
-    values += wide * slot_size * (one.edges + 2); // behind, the first vertex while separators are solved for
+    // Behind, the first vertex while separators are solved for; packs begin at their multiples.
+    values += wide * ((slot_size * (one.edges + 2) + lanes - 1) / lanes * lanes);
     for (int l = 0; l < count; ++l) {
       const Run &of = runs_[run[l]];
       g.entry[l] = int(rows.size());

@@ -38,6 +38,11 @@ public:
       for (ContactMemory &m : of_rod) m = {++count_, ++count_, ++count_, Vec3(1, ++count_, 2), Vec3(++count_, 3, 4)};
     }
   }
+  void operator()(std::vector<std::array<Vec3, 2>> &axes) { // of junctions, as many as there are
+    for (auto &of_group : axes)
+      for (Vec3 &axis : of_group)
+        for (double &x : axis) (*this)(x);
+  }
   void operator()(std::vector<Rates> &all) {
     all.resize(2);
     for (Rates &rates : all) {
@@ -129,9 +134,11 @@ struct Taken {
 TEST(Checkpoint, HoldsEveryField) {
   const Folder folder;
   const std::string path = folder.path("checkpoint.h5");
-  const Filled written;
+  Scene scene = turnedScene();
+  scene.junctions = {{"corner", {{0, 2, 0}}, 1}};
+  const Filled written(scene);
   written.write(path);
-  const Taken read(path, turnedScene(), settingsOf("bdf2"));
+  const Taken read(path, scene, settingsOf("bdf2"));
   EXPECT_TRUE(read.sim.state == written.sim.state);
   EXPECT_EQ(numbersOf(read.control), numbersOf(written.control));
   EXPECT_EQ(read.all(), "");

@@ -2,6 +2,8 @@
 
 #include "tendril/model/scene.hpp"
 
+#include <map>
+
 namespace tendril {
 namespace {
 
@@ -76,6 +78,16 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
       if (elements.twistMass()[s] > 0)
         a.edge[e] = -force[3][s] / elements.twistMass()[s] - damping * state.twist_rate[e];
     }
+  }
+  std::map<int, double> mass; // of junctions, by the slots of their first members, which have all forces
+  const auto joined = elements.joinedVertices(potential.all());
+  for (const JoinedVertex &j : joined) mass[j.first_slot] += elements.mass()[j.slot];
+  for (const JoinedVertex &j : joined) {
+    const double whole = elements.freedom()[j.slot] * mass[j.first_slot],
+                 damping = potential.scene().rods[j.rod].material.mass_damping_coefficient;
+    const int v = elements.rods[j.rod].first_vertex + j.vertex;
+    if (whole > 0)
+      a.vertex[v] = -potential.gradient(j.rod).equilibrium.vector(0, j.first_slot) / whole - damping * state.velocity[v];
   }
   return a;
 }
