@@ -24,6 +24,14 @@ CellPlace placeOf(const RodRange &rod, const LooseCell &cell, const CellOf<doubl
           !rod.closed && (i == 0 || i == rod.edges)};
 }
 
+/// The junction of a vertex, or null.
+const Junction *junctionAt(const Scene &scene, int rod, int vertex) {
+  for (const Junction &j : scene.junctions)
+    for (const Junction::Member &m : j.members)
+      if (m.rod == rod && m.vertex == vertex) return &j;
+  return nullptr;
+}
+
 /// Calls visit(frames, constants, Lbar, place, measure) for the cells of every rod.
 template <class Visit> void eachCell(const Elements &elements, const Configuration &c, Visit visit) {
   for (int r = 0; r < int(elements.rods.size()); ++r)
@@ -132,19 +140,24 @@ RodActions rodActions(const Scene &scene, const Elements &elements, const State 
     if (const int frame = elements.support_slot[k]; frame >= 0)
       out.reaction_moment[k] = momentOn(elements, elements.cells(), c, support.rod, frame);
     if (!support.holdsPosition()) continue;
-    const Rod &rod = scene.rods[support.rod];
-    const RodRange &range = elements.rods[support.rod];
-    const int v = range.first_vertex + support.vertex, before = rod.edgeBefore(support.vertex),
-              after = rod.edgeAfter(support.vertex);
-    const double mass = elements.mass()[elements.vertex_slot[v]];
-    Vec3 loads = scene.rotation.matrix() * (state.position[v] - scene.rotation.centre) * mass;
-    if (rod.gravity) loads += mass * scene.gravity;
-    for (const NodalForce &f : scene.forces)
-      if (f.rod == support.rod && f.vertex == support.vertex) loads += f.force;
     Vec3 &reaction = out.reaction[k];
-    reaction = mass * rod.material.mass_damping_coefficient * state.velocity[v] - load_factor * loads;
-    if (before >= 0) reaction += out.force[range.first_edge + before];
-    if (after >= 0) reaction -= out.force[range.first_edge + after];
+    auto add = [&](int r, int vertex) {
+      const Rod &rod = scene.rods[r];
+      const RodRange &range = elements.rods[r];
+      const int v = range.first_vertex + vertex, before = rod.edgeBefore(vertex), after = rod.edgeAfter(vertex);
+      const double mass = elements.mass()[elements.vertex_slot[v]];
+      Vec3 loads = scene.rotation.matrix() * (state.position[v] - scene.rotation.centre) * mass;
+      if (rod.gravity) loads += mass * scene.gravity;
+      for (const NodalForce &f : scene.forces)
+        if (f.rod == r && f.vertex == vertex) loads += f.force;
+      reaction += mass * rod.material.mass_damping_coefficient * state.velocity[v] - load_factor * loads;
+      if (before >= 0) reaction += out.force[range.first_edge + before];
+      if (after >= 0) reaction -= out.force[range.first_edge + after];
+    };
+    const Junction *junction = junctionAt(scene, support.rod, support.vertex);
+    if (!junction) add(support.rod, support.vertex);
+    for (std::size_t m = 0; junction && m < junction->members.size(); ++m) // it holds them all
+      add(junction->members[m].rod, junction->members[m].vertex);
   }
   return out;
 }

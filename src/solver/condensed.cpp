@@ -125,17 +125,23 @@ constexpr int most_dense = 200; ///< unknowns of a Schur complement
 
 } // namespace
 
+/// Whether a rod that bends runs through a junction without a frame.
+static bool runsThrough(const DofMap &dofs, const JoinedVertex &j) {
+  const RodRange &rod = dofs.rods()[j.rod];
+  if (!rod.twist || j.vertex == 0 || j.vertex == rod.edges) return false;
+  const auto edges = dofs.joinedEdges({j.rod, j.rod + 1});
+  return std::none_of(edges.begin(), edges.end(), [&](const JoinedEdge &e) { return e.vertex == j.vertex; });
+}
+
 bool CondensedFactor::suits(const DofMap &dofs, RodSet rods) {
-  for (const JoinedVertex &j : dofs.joinedVertices(rods)) {
-    const RodRange &rod = dofs.rods()[j.rod];
-    if (rod.closed) return false;
-    if (j.vertex == 0 || j.vertex == rod.edges || !rod.twist) continue;
-    const auto edges = dofs.joinedEdges({j.rod, j.rod + 1});
-    if (std::none_of(edges.begin(), edges.end(), [&](const JoinedEdge &e) { return e.vertex == j.vertex; }))
-      return false;
-  }
   for (int r = rods.begin; r < rods.end; ++r)
     if (dofs.rods()[r].closed) return false;
+  for (const JoinedVertex &j : dofs.joinedVertices(rods)) {
+    if (!runsThrough(dofs, j)) continue;
+    if (dofs.isHeld(dofs.rods()[j.rod].first_vertex + j.vertex + 1)) return false;
+    for (const JoinedVertex &other : dofs.joinedVertices({j.rod, j.rod + 1}))
+      if (other.vertex == j.vertex + 1) return false;
+  }
   return true;
 }
 
@@ -162,6 +168,13 @@ void CondensedFactor::cut() {
     begin = dofs_.unknown(slot, 0) < 0 ? -1 : int(unknown_.size());
     for (int a = 0; a < 3 && begin >= 0; ++a) unknown_.push_back(int(dofs_.unknown(slot, a) - first));
   }
+  std::map<int, int> edge_number; // of the vector and the twist of an edge that a rod runs through with, by its slot
+  for (const JoinedVertex &j : dofs_.joinedVertices(rods_)) {
+    if (!runsThrough(dofs_, j)) continue;
+    edge_number[j.slot] = int(unknown_.size());
+    unknown_.insert(unknown_.end(), 3, -1);
+    unknown_.push_back(int(dofs_.unknown(j.slot, 3) - first));
+  }
   auto places = [&](const JoinedVertex &j, const JoinedEdge *edge) {
     Places p;
     p.fill(-1);
@@ -169,6 +182,8 @@ void CondensedFactor::cut() {
       if (const int begin = number.at(j.first_slot); begin >= 0) p[a] = begin + a;
       if (edge) p[edge_at + a] = number.at(edge->first_frame) + a;
     }
+    if (const auto through = edge_number.find(j.slot); through != edge_number.end())
+      for (int c = 0; c < edge_size; ++c) p[edge_at + c] = through->second + c;
     return p;
   };
   for (int r = rods_.begin; r < rods_.end; ++r) {
@@ -185,7 +200,8 @@ void CondensedFactor::cut() {
     const JoinedVertex *near = nullptr;
     auto add = [&](int begin, int end, const JoinedVertex *far) {
       if (begin == end) return;
-      Run run{r, begin, end - begin, near != nullptr, far != nullptr, {}, {}, nullptr, nullptr, {}};
+      Run run{r,  begin, end - begin, near != nullptr, far != nullptr, near && runsThrough(dofs_, *near),
+              far && runsThrough(dofs_, *far), {}, {}, nullptr, nullptr, {}};
       run.near.fill(-1);
       run.far.fill(-1);
       if (near) run.near_frame = frameOf(begin, begin);
@@ -214,7 +230,7 @@ void CondensedFactor::group(std::vector<int> &rows, std::vector<int> &columns) {
   std::iota(order.begin(), order.end(), 0);
   auto shape = [&](int k) {
     const Run &run = runs_[k];
-    return std::tie(run.edges, run.from_separator, run.to_separator, run.held);
+    return std::tie(run.edges, run.from_separator, run.to_separator, run.from_through, run.to_through, run.held);
   };
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return shape(a) < shape(b); });
   auto block = [&](const Places &row, const Places &column) {
@@ -357,7 +373,8 @@ template <class T> void CondensedFactor::factorGroup(const Group &group, const B
   };
   auto isAcross = [](int plane) { return plane >= EdgeBlocks::across(0, 0) && plane < EdgeBlocks::vertex(0, 0); };
   auto read = [&](int plane, int i) {
-    if (isAcross(plane) && ((i == 0 && first.from_separator) || (i == end && first.to_separator))) {
+    if (isAcross(plane) && ((i == 0 && first.from_separator && !first.from_through) ||
+                            (i == end && first.to_separator && !first.to_through))) {
       const int row = (plane - edge_pairs) / edge_size, column = (plane - edge_pairs) % edge_size,
                 turn = i == 0 ? row : column, variable = i == 0 ? column : row;
       return make([&](int l) {
@@ -381,7 +398,7 @@ template <class T> void CondensedFactor::factorGroup(const Group &group, const B
   T *const vertex = as<T>(&records_[group.record]), *const records = vertex + bordered_vertex_record;
   T negative(0.0), zero(0.0);
   auto eliminate = [&]<Border border, bool joins>() {
-    Elimination<T, border, joins, decltype(read)> elimination({0, end}, first.held, read, records);
+    Elimination<T, border, joins, decltype(read)> elimination({0, end, first.from_through}, first.held, read, records);
     Block<T> near{}, between{}, far{};
     if (first.from_separator)
       elimination.runTo(near, between, far, vertex);
@@ -418,7 +435,7 @@ template <class T, class Visit> void CondensedFactor::eachValue(const Group &gro
     for (int i = 0; i <= run.edges; ++i) {
       const bool separated = (i == 0 && run.from_separator) || (i == run.edges && run.to_separator);
       for (int a = 0; a < slot_size; ++a, v += step) {
-        const bool none = a < 3 ? separated : i == run.edges;
+        const bool none = a < 3 ? separated : i == run.edges || (i == 0 && run.from_through);
         const PetscInt u = none ? -1 : dofs_.unknown(rod.slot(run.begin + i), a);
         visit(*v, u < 0 ? -1 : u - first);
       }
@@ -432,10 +449,11 @@ void CondensedFactor::solve(const PetscScalar *b, PetscScalar *x) {
     workspace_.copy.assign(b, b + unknowns);
     b = workspace_.copy.data();
   }
-  for (std::size_t k = 0; k < unknown_.size(); ++k) separators_[k] = b[unknown_[k]];
+  for (std::size_t k = 0; k < unknown_.size(); ++k) separators_[k] = unknown_[k] < 0 ? 0 : b[unknown_[k]];
   for (const Group &group : groups_) group.packed ? solveTo<Pack>(group, b) : solveTo<double>(group, b);
   if (!unknown_.empty()) schur_->solve(separators_);
-  for (std::size_t k = 0; k < unknown_.size(); ++k) x[unknown_[k]] = separators_[k];
+  for (std::size_t k = 0; k < unknown_.size(); ++k)
+    if (unknown_[k] >= 0) x[unknown_[k]] = separators_[k];
   for (const Group &group : groups_) group.packed ? solveFrom<Pack>(group, x) : solveFrom<double>(group, x);
 }
 
@@ -447,7 +465,7 @@ template <class T> void CondensedFactor::solveTo(const Group &group, const Petsc
   T near[state_size], far[state_size];
   T *const values = as<T>(&values_[group.value]);
   auto go = [&]<Border border>() {
-    Substitution<T, border>({0, first.edges}, first.held, records, vertex).toFirst(values, near, far);
+    Substitution<T, border>({0, first.edges, first.from_through}, first.held, records, vertex).toFirst(values, near, far);
   };
   first.to_separator ? go.template operator()<Border::separator>() : go.template operator()<Border::none>();
   if (!first.from_separator) {
@@ -498,7 +516,7 @@ template <class T> void CondensedFactor::solveFrom(const Group &group, PetscScal
       near[r] -= vertex[vertex_record + r * state_size + c] * far[c];
   }
   auto go = [&]<Border border>() {
-    Substitution<T, border>({0, first.edges}, first.held, records, vertex).fromFirst(near, far, values);
+    Substitution<T, border>({0, first.edges, first.from_through}, first.held, records, vertex).fromFirst(near, far, values);
   };
   first.to_separator ? go.template operator()<Border::separator>() : go.template operator()<Border::none>();
   eachValue<T>(group, [&](double &value, PetscInt u) {

@@ -432,10 +432,11 @@ bool IncrementalPotential::moveOn(double time, const StageRule &end) {
       for (int l = 0; l < std::min(lanes, rod.edges - i); ++l)
         increment[3][rod.slot(i + l)] = end.guess.atEdge(rod.first_edge + i + l) - spun[l];
     }
-    for (const JoinedEdge &j : elements_.joinedEdges({r, r + 1})) // as far again as in the first half
-      increment.setVector(0, j.frame, iterate_.positionAt(j.frame));
     dofs_.copyBehindRing(rod, increment);
   }
+  turnFrames(all(), increment);
+  for (const JoinedEdge &j : elements_.joinedEdges(all()))
+    if (step_.rule->fraction == 0.5) increment.setVector(0, j.frame, iterate_.positionAt(j.frame)); // as far again
   remainingMotion(all(), increment);
   for (int r = 0; r < all().end; ++r) {
     supports_.follow(r, iterate_);

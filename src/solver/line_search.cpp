@@ -175,12 +175,17 @@ void NewtonSolver::goBeyond(RodSet island, const Descent &d, double *lambda,
       !(gain > 0.6 && gain < 1) || !(-d.slope > 1e3 * d.before.noise))
     return;
   const double longer = std::min(2.0, 0.5 / (1 - gain));
+  const std::vector<IncrementalPotential::RodEnergy> before(work_->tried.begin() + island.begin,
+                                                            work_->tried.begin() + island.end);
   const IncrementalPotential::RodEnergy beyond = tryLength(island, longer);
   if (beyond.value < there->value) {
     *there = beyond;
     *lambda = longer;
-  } else
-    tryLength(island, 1);
+    return;
+  }
+  report_.trials -= island.end - island.begin; // it has been counted
+  tryLength(island, 1);
+  std::copy(before.begin(), before.end(), work_->tried.begin() + island.begin);
 }
 
 /// Moves an island along its increment; false when no length of the step lowers its energy enough.

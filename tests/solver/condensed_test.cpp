@@ -50,13 +50,13 @@ void draw(Net &net, Random &random, int rods, int nodes, bool frames) {
     if (kind != 2) join(to, edges);
     if (kind == 3 && edges > 3) { // through another one
       const int middle = (std::max(from, to) + 1) % nodes;
-      if (middle != from && middle != to && (net.scene.junctions[middle].groups > 0 || rod.material.isCable())) {
+      if (middle != from && middle != to) {
         net.scene.rods.back().position[edges / 2] = places[middle];
         setBishopDirectors(net.scene.rods.back());
         join(middle, edges / 2);
       }
     }
-    if (random() > 0.5 && edges > 4) net.scene.supports.push_back(hold(net.scene, r, 1, Support::Kind::pin));
+    if (random() > 0.5 && edges > 5) net.scene.supports.push_back(hold(net.scene, r, 1, Support::Kind::pin));
   }
   std::erase_if(net.scene.junctions, [](const Junction &j) { return j.members.size() < 2; });
   if (random() > 0) {
@@ -80,16 +80,13 @@ void fill(Net &net, Random &random, double diagonal) {
         for (int c = r; c < edge_size; ++c)
           if (rod.twist || c < 3)
             net.blocks.entry(rod, EdgeBlocks::own(r, c))[i] = random() + (r == c ? diagonal : 0);
+    const int index = int(&rod - net.dofs.rods().data());
+    const auto joined = net.dofs.joinedEdges({index, index + 1});
     for (int i = 1; i < rod.edges; ++i) {
-      const auto joined = net.dofs.joinedEdges({int(&rod - net.dofs.rods().data()), int(&rod - net.dofs.rods().data()) + 1});
-      const auto vertices =
-          net.dofs.joinedVertices({int(&rod - net.dofs.rods().data()), int(&rod - net.dofs.rods().data()) + 1});
-      const bool cut = std::any_of(vertices.begin(), vertices.end(), [&](const JoinedVertex &j) { return j.vertex == i; });
-      if (cut) continue;
-      (void)joined;
+      if (std::any_of(joined.begin(), joined.end(), [&](const JoinedEdge &j) { return j.vertex == i; })) continue;
       for (int r = 0; r < edge_size; ++r)
         for (int c = 0; c < edge_size; ++c)
-          if (rod.twist || (r < 3 && c < 3)) net.blocks.entry(rod, EdgeBlocks::across(r, c))[i] = random();
+          if (rod.twist) net.blocks.entry(rod, EdgeBlocks::across(r, c))[i] = random(); // cables have no cells
     }
     for (int i = 0; i < rod.vertices; ++i)
       for (int r = 0; r < 3; ++r)

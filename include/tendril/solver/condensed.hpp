@@ -30,7 +30,8 @@ class CondensedFactor {
 public:
   static constexpr const char *name = "condensed";
   CondensedFactor(const DofMap &dofs, RodSet rods, BandedWorkspace &workspace);
-  /// Whether it can factor some rods: a rod that bends and runs through a junction without a frame it cannot.
+  /// Whether it can factor some rods: where one that bends runs through a junction without a frame, the next vertex
+  /// must be neither held nor in a junction.
   static bool suits(const DofMap &dofs, RodSet rods);
 
   void factor(const BandedSystem &system);
@@ -49,6 +50,7 @@ private:
   struct Run {
     int rod, begin, edges;
     bool from_separator, to_separator;
+    bool from_through, to_through; ///< whether the rod runs on there, with its first edge and twist for unknowns
     Places near, far;
     const JoinedEdge *near_frame = nullptr, *far_frame = nullptr; ///< to which its first and last edge are tied
     std::vector<char> held; ///< of its vertices
@@ -66,7 +68,7 @@ private:
   BandedWorkspace &workspace_;
   std::vector<Run> runs_;
   std::vector<Group> groups_;
-  std::vector<int> unknown_; ///< of each separator's unknown, among those of the rods
+  std::vector<int> unknown_; ///< of each separator's unknown, among those of the rods; -1: an edge's vector
   AlignedVector records_, values_;
   std::vector<double> entries_, separators_; ///< of the Schur complement; of a right-hand side or solution
   std::size_t own_entries_ = 0;              ///< where those begin that separators have by themselves

@@ -14,7 +14,7 @@ namespace tendril {
 template <class T, Border border, bool joins, class Read> class Elimination {
 public:
   Elimination(const RunRange &run, const std::vector<char> &held, const Read &read, T *records)
-      : begin_(run.begin), n_(run.end), last_(ring ? n_ - 1 : n_), held_(held), read_(read), records_(records) {}
+      : begin_(run.begin), n_(run.end), last_(ring ? n_ - 1 : n_), keeps_first_(run.keeps_first), held_(held), read_(read), records_(records) {}
 
   /// \param first receives L and inverse pivots of the first vertex
   [[gnu::flatten]] void run(T *first) {
@@ -59,7 +59,22 @@ private:
       else
         step(i, nextHeld(i));
     }
-    firstEdge();
+    keeps_first_ ? keepFirst() : firstEdge();
+  }
+
+  /// The state becomes that of the first edge with its vertex, and what these have by themselves is added.
+  void keepFirst() {
+    moveBack(false);
+    addVertex(begin_, state_);
+    for (int r = 0; r < edge_size; ++r) {
+      for (int c = 0; c < edge_size; ++c)
+        state_[edge_at + r].set(edge_at + c, state_[edge_at + r][edge_at + c] + own(r, c, begin_));
+      for (int c = 0; c < 3 && joins; ++c) {
+        const T v = state_[c][edge_at + r] + joined(c, r, begin_);
+        state_[c].set(edge_at + r, v);
+        state_[edge_at + r].set(c, v);
+      }
+    }
   }
 
   void factorVertex(T *first) {
@@ -93,6 +108,7 @@ private:
   static constexpr bool ring = border == Border::ring, bordered = border != Border::none;
   static constexpr int width = Record<T>::width;
   const int begin_, n_, last_;
+  const bool keeps_first_;
   const std::vector<char> &held_;
   const Read &read_;
   T *const records_;

@@ -85,9 +85,11 @@ template <class T> using Square = Row<T>[state_size];
 /// What the elimination of edges goes towards at their far end: nothing, the first vertex and edge of the same ring, or
 /// the vertex and the frame of a junction.
 enum class Border { none, ring, separator };
-/// Edges of a rod that are eliminated together, [begin, end).
+/// Edges of a rod that are eliminated together, [begin, end); but the first where it is kept, for a separator that the
+/// rod runs through: with the vertex where it begins, and its twist.
 struct RunRange {
   int begin, end;
+  bool keeps_first = false;
 };
 
 /// What is kept of an edge to solve with: G = A^-1 B, where A is the edge's own matrix and B what it has with the

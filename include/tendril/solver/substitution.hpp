@@ -13,7 +13,7 @@ template <class T, Border border> class Substitution {
 public:
   /// \param first record of the first vertex
   Substitution(const RunRange &run, const std::vector<char> &held, const T *records, const T *first)
-      : begin_(run.begin), end_(run.end), last_(ring ? end_ - 1 : end_),
+      : begin_(run.begin), end_(run.end), first_(run.keeps_first ? begin_ + 1 : begin_), last_(ring ? end_ - 1 : end_),
         border_end_(bordered ? std::max(ring ? begin_ + 1 : begin_, int(firstLane(first[border_begin]))) : 0), held_(held),
         records_(records) {}
 
@@ -25,7 +25,7 @@ public:
     std::fill_n(far, state_size, T(0.0));
     if (!bordered)
       for (int a = 0; a < 3; ++a) q[a] = values[slot_size * last_ + a];
-    for (int i = end_ - 1; i >= begin_; --i) {
+    for (int i = end_ - 1; i >= first_; --i) {
       const T *g = record(i);
       T *here = values + slot_size * i;
       T r[edge_size];
@@ -60,12 +60,14 @@ public:
 #pragma GCC unroll 7
       for (int c = 0; c < state_size; ++c) q[c] = next[c];
     }
+    for (int a = 0; a < 3 && first_ > begin_; ++a) q[edge_at + a] += q[a]; // from the vertex behind the first edge
   }
 
   /// Then, with the solution there, all others.
   void fromFirst(T (&near)[state_size], T (&far)[state_size], T *values) const {
     T *const u = near;
-    for (int i = begin_; i < end_; ++i) {
+    for (int a = 0; a < 3 && first_ > begin_; ++a) u[a] += u[edge_at + a];
+    for (int i = first_; i < end_; ++i) {
       const T *g = record(i);
       T *here = values + slot_size * i;
       T v[edge_size];
@@ -108,7 +110,7 @@ private:
   static constexpr bool ring = border == Border::ring, bordered = border != Border::none;
   static constexpr int w = Record<T>::width;
   static constexpr std::size_t size = bordered ? Record<T>::bordered : Record<T>::plain;
-  const int begin_, end_, last_, border_end_;
+  const int begin_, end_, first_, last_, border_end_;
   const std::vector<char> &held_;
   const T *const records_;
 
