@@ -1,6 +1,7 @@
 /// The stages of a step in time: their solves, what supports do in them, the error of the step.
 #include "tendril/dynamics/time_loop.hpp"
 
+#include "tendril/layout/same_vertices.hpp"
 #include "tendril/solver/hints.hpp"
 
 #include <algorithm>
@@ -77,9 +78,11 @@ void TimeLoop::finish(const State &start, double h, RodSet rods, State *next) {
     for (const int k : moving_of_[r]) {
       const Support *support = moving_[k].support;
       if (!support || !support->holdsPosition()) continue;
-      const int v = potential.elements().rods[r].first_vertex + support->vertex;
-      next->velocity[v] = support->motion.velocityAt(potential.step().time);
-      for (Rates &rates : next->memory) rates.vertex[v].setZero();
+      forSameVertices(potential.elements(), r, support->vertex, [&](int rod, int vertex) {
+        const int v = potential.elements().rods[rod].first_vertex + vertex;
+        next->velocity[v] = support->motion.velocityAt(potential.step().time);
+        for (Rates &rates : next->memory) rates.vertex[v].setZero();
+      });
     }
 }
 
@@ -126,7 +129,7 @@ double TimeLoop::movedKinetic(const State &state) const {
   for (const Holder &h : moving_) {
     const RodRange &rod = potential.elements().rods[h.rod];
     if (h.support && h.support->holdsPosition())
-      sum += 0.5 * potential.elements().mass()[rod.slot(h.support->vertex)] *
+      sum += 0.5 * massWithSame(potential.elements(), h.rod, h.support->vertex) *
              state.velocity[rod.first_vertex + h.support->vertex].squaredNorm();
   }
   return sum;

@@ -2,6 +2,7 @@
 
 #include "tendril/energy/edge.hpp"
 #include "tendril/energy/term.hpp"
+#include "tendril/layout/same_vertices.hpp"
 
 namespace tendril {
 namespace {
@@ -22,14 +23,6 @@ CellPlace placeOf(const RodRange &rod, const LooseCell &cell, const CellOf<doubl
                                                         : CellPlace::full;
   return {kind, rod.first_vertex + i, rod.first_edge + (i + rod.vertices - 1) % rod.vertices, rod.first_edge + i,
           !rod.closed && (i == 0 || i == rod.edges)};
-}
-
-/// The junction of a vertex, or null.
-const Junction *junctionAt(const Scene &scene, int rod, int vertex) {
-  for (const Junction &j : scene.junctions)
-    for (const Junction::Member &m : j.members)
-      if (m.rod == rod && m.vertex == vertex) return &j;
-  return nullptr;
 }
 
 /// Calls visit(frames, constants, Lbar, place, measure) for the cells of every rod.
@@ -141,7 +134,7 @@ RodActions rodActions(const Scene &scene, const Elements &elements, const State 
       out.reaction_moment[k] = momentOn(elements, elements.cells(), c, support.rod, frame);
     if (!support.holdsPosition()) continue;
     Vec3 &reaction = out.reaction[k];
-    auto add = [&](int r, int vertex) {
+    forSameVertices(elements, support.rod, support.vertex, [&](int r, int vertex) {
       const Rod &rod = scene.rods[r];
       const RodRange &range = elements.rods[r];
       const int v = range.first_vertex + vertex, before = rod.edgeBefore(vertex), after = rod.edgeAfter(vertex);
@@ -153,11 +146,7 @@ RodActions rodActions(const Scene &scene, const Elements &elements, const State 
       reaction += mass * rod.material.mass_damping_coefficient * state.velocity[v] - load_factor * loads;
       if (before >= 0) reaction += out.force[range.first_edge + before];
       if (after >= 0) reaction -= out.force[range.first_edge + after];
-    };
-    const Junction *junction = junctionAt(scene, support.rod, support.vertex);
-    if (!junction) add(support.rod, support.vertex);
-    for (std::size_t m = 0; junction && m < junction->members.size(); ++m) // it holds them all
-      add(junction->members[m].rod, junction->members[m].vertex);
+    });
   }
   return out;
 }

@@ -372,16 +372,24 @@ template <class T> void CondensedFactor::factorGroup(const Group &group, const B
       return of_lane(0);
   };
   auto isAcross = [](int plane) { return plane >= EdgeBlocks::across(0, 0) && plane < EdgeBlocks::vertex(0, 0); };
-  auto read = [&](int plane, int i) {
-    if (isAcross(plane) && ((i == 0 && first.from_separator && !first.from_through) ||
-                            (i == end && first.to_separator && !first.to_through))) {
-      const int row = (plane - edge_pairs) / edge_size, column = (plane - edge_pairs) % edge_size,
-                turn = i == 0 ? row : column, variable = i == 0 ? column : row;
-      return make([&](int l) {
-        const double *from = tie[i == 0 ? 0 : 1][l];
-        return from && turn < 3 ? from[EdgeBlocks::across(turn, variable) * stride[l]] : 0.0;
-      });
-    }
+  auto atEnds = [&](int plane, int i) {
+    return isAcross(plane) && ((i == 0 && first.from_separator && !first.from_through) ||
+                               (i == end && first.to_separator && !first.to_through));
+  };
+  auto fromTie = [&](int plane, int i) {
+    const int row = (plane - edge_pairs) / edge_size, column = (plane - edge_pairs) % edge_size,
+              turn = i == 0 ? row : column, variable = i == 0 ? column : row;
+    return make([&](int l) {
+      const double *from = tie[i == 0 ? 0 : 1][l];
+      return from && turn < 3 ? from[EdgeBlocks::across(turn, variable) * stride[l]] : 0.0;
+    });
+  };
+  auto plain = [&](int plane, int i) {
+    if (atEnds(plane, i)) return fromTie(plane, i);
+    return make([&](int l) { return source[l][plane * stride[l] + i]; });
+  };
+  auto rare = [&](int plane, int i) { // with shifts, and cables, whose twist is no unknown
+    if (atEnds(plane, i)) return fromTie(plane, i);
     return make([&](int l) {
       double v = source[l][plane * stride[l] + i];
       if (plane == EdgeBlocks::own(3, 3))
@@ -397,8 +405,8 @@ template <class T> void CondensedFactor::factorGroup(const Group &group, const B
   };
   T *const vertex = as<T>(&records_[group.record]), *const records = vertex + bordered_vertex_record;
   T negative(0.0), zero(0.0);
-  auto eliminate = [&]<Border border, bool joins>() {
-    Elimination<T, border, joins, decltype(read)> elimination({0, end, first.from_through}, first.held, read, records);
+  auto eliminate = [&]<Border border, bool joins>(const auto &read) {
+    Elimination<T, border, joins, std::decay_t<decltype(read)>> elimination({0, end, first.from_through}, first.held, read, records);
     Block<T> near{}, between{}, far{};
     if (first.from_separator)
       elimination.runTo(near, between, far, vertex);
@@ -408,12 +416,16 @@ template <class T> void CondensedFactor::factorGroup(const Group &group, const B
     negative = elimination.negative;
     zero = elimination.zero;
   };
-  const bool joins = system.blocks->joins();
-  if (first.to_separator)
-    joins ? eliminate.template operator()<Border::separator, true>()
-          : eliminate.template operator()<Border::separator, false>();
-  else
-    joins ? eliminate.template operator()<Border::none, true>() : eliminate.template operator()<Border::none, false>();
+  const bool is_rare = shift != 0 || std::any_of(cable.begin(), cable.begin() + width, [](bool c) { return c; });
+  auto choose = [&]<Border border>() {
+    if (system.blocks->joins())
+      eliminate.template operator()<border, true>(rare);
+    else if (is_rare)
+      eliminate.template operator()<border, false>(rare);
+    else
+      eliminate.template operator()<border, false>(plain);
+  };
+  first.to_separator ? choose.template operator()<Border::separator>() : choose.template operator()<Border::none>();
   for (int l = 0; l < group.count; ++l)
     if constexpr (std::is_same_v<T, Pack>) {
       negative_ += int(negative[l]);

@@ -1,6 +1,7 @@
 #include "tendril/solver/incremental_potential.hpp"
 
 #include "tendril/energy/edge.hpp"
+#include "tendril/layout/same_vertices.hpp"
 
 #include <algorithm>
 #include <map>
@@ -405,9 +406,11 @@ std::array<Vec3, 2> IncrementalPotential::actionOf(const Holder &holder) {
     // What methods remember of held vertices is nothing, which does not matter to them: the velocity that dissipates is
     // that of the way.
     const Vec3 astray = moved / (step_.time - start_time_) - velocity;
-    const double alpha = scene_.rods[support.rod].material.mass_damping_coefficient;
-    action[0] =
-        gradient(support.rod).equilibrium.vector(0, slot) + elements_.mass()[slot] * (alpha * astray - acceleration);
+    action[0] = gradient(support.rod).equilibrium.vector(0, slot); // of all that is one point with it
+    forSameVertices(elements_, support.rod, support.vertex, [&](int r, int vertex) {
+      const double alpha = scene_.rods[r].material.mass_damping_coefficient;
+      action[0] += elements_.mass()[elements_.rods[r].slot(vertex)] * (alpha * astray - acceleration);
+    });
   }
   return action;
 }
