@@ -83,7 +83,7 @@ PetscErrorCode TimeLoop::attempt(const State &state, State *next, Attempt *now) 
   for (const Holder &h : moving_)
     if (h.collider)
       now->work.obstacles += workOf(h, solver_.potential().actionOf(h), potential.elements(), potential.start(),
-                                   potential.iterate(), state.time, next->time);
+                                    potential.iterate(), state.time, next->time);
   PetscFunctionReturn(0);
 }
 

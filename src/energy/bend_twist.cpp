@@ -119,7 +119,8 @@ private:
   template <Measure measure>
   [[gnu::noinline]] void addJoined(const Configuration &c, const LooseCell &cell, const CellOf<double> &constants,
                                    const std::array<double *, slot_size> *gradient, const BlockPlanes *blocks) const {
-    const int frame = cell.turning == 0 ? cell.frame0 : cell.frame1, edge = cell.turning == 0 ? cell.frame1 : cell.frame0;
+    const int frame = cell.turning == 0 ? cell.frame0 : cell.frame1,
+              edge = cell.turning == 0 ? cell.frame1 : cell.frame0;
     const JointCellDerivatives d =
         jointCellDerivatives<measure>(c.frameAt(cell.frame0), c.frameAt(cell.frame1), constants, cell.turning);
     for (int r = 0; gradient && r < 3; ++r) {

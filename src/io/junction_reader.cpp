@@ -24,9 +24,8 @@ std::vector<std::vector<Junction::Member>> sharedPoints(const Scene &scene, cons
   auto x = [&](const Junction::Member &m) -> const Vec3 & { return scene.rods[m.rod].position[m.vertex]; };
   std::vector<int> order(all.size());
   for (int k = 0; k < int(order.size()); ++k) order[k] = k;
-  std::sort(order.begin(), order.end(), [&](int a, int b) {
-    return x(all[a])[0] != x(all[b])[0] ? x(all[a])[0] < x(all[b])[0] : a < b;
-  });
+  std::sort(order.begin(), order.end(),
+            [&](int a, int b) { return x(all[a])[0] != x(all[b])[0] ? x(all[a])[0] < x(all[b])[0] : a < b; });
   std::vector<int> first(all.size());
   for (int k = 0; k < int(first.size()); ++k) first[k] = k;
   auto rootOf = [&](int k) {
@@ -82,9 +81,9 @@ void complete(const YamlValue &value, const Junction &junction, double within, S
                  (other->second == junction.name ? "name it once" : "list all its members in one junction"));
     const Vec3 &first = placeOf(scene, junction.members.front());
     if (const double away = (placeOf(scene, m) - first).norm(); away > within)
-      value.fail(labelOf(scene, m) + " is " + shortText(away) + " m from " +
-                 labelOf(scene, junction.members.front()) + ", and a junction joins what is within " +
-                 shortText(within) + " m: move one of them, or write a larger 'within'");
+      value.fail(labelOf(scene, m) + " is " + shortText(away) + " m from " + labelOf(scene, junction.members.front()) +
+                 ", and a junction joins what is within " + shortText(within) +
+                 " m: move one of them, or write a larger 'within'");
     placeOf(scene, m) = first;
     for (const Support &s : scene.supports) {
       if (s.rod != m.rod || s.vertex != m.vertex) continue;
@@ -129,7 +128,8 @@ void readJunction(const YamlValue &value, SceneFile &out) {
     Junction junction;
     junction.name = listed ? name : name + "#" + std::to_string(k);
     junction.members = std::move(points[k]);
-    if (junction.members.empty()) map.at("junctions[].members").fail("'members' is empty; a junction needs two or more");
+    if (junction.members.empty())
+      map.at("junctions[].members").fail("'members' is empty; a junction needs two or more");
     const Junction::Member &only = junction.members.front();
     if (junction.members.size() < 2 && !(rigid && scene.rods[only.rod].edgeBefore(only.vertex) >= 0 &&
                                          scene.rods[only.rod].edgeAfter(only.vertex) >= 0))

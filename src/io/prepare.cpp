@@ -140,8 +140,9 @@ PetscErrorCode prepare(Prepared &prepared, Options &o) {
           "length; take a clamp, or compare runs with -rod_edges");
   if (!file.scene.colliders.empty()) refuseWithObstacles(o);
   if (o.accuracy && !file.scene.junctions.empty())
-    throw SceneError("option -accuracy: chooses the edges of each rod by itself, and is not for scenes with 'junctions' "
-                     "yet; compare runs with -rod_edges, or take -error_estimate");
+    throw SceneError(
+        "option -accuracy: chooses the edges of each rod by itself, and is not for scenes with 'junctions' "
+        "yet; compare runs with -rod_edges, or take -error_estimate");
   if (o.accuracy && o.accuracy->of == Quantity::tip)
     for (const Rod &rod : file.scene.rods)
       if (rod.closed)

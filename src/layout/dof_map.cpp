@@ -102,7 +102,7 @@ PetscErrorCode DofMap::setUp(const Scene &scene) {
   const std::vector<int> before_junctions = along;
   for (const Junction &j : scene.junctions)
     for (const Junction::Member &m : j.members) along[m.rod] += 4; // frames and half cells of two edges
-  slots_ = lanes; // room for the frame before the first rod
+  slots_ = lanes;                                                  // room for the frame before the first rod
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
     const Rod &rod = scene.rods[r];
     // A pack between the slots behind the last vertex and what follows, so that no pack holds parts of both; and a slot
@@ -184,8 +184,7 @@ void DofMap::join(const Scene &scene, std::vector<int> free_slots) {
     for (const Junction::Member &m : junction.members) {
       const RodRange &range = rods_[m.rod];
       const Rod &rod = scene.rods[m.rod];
-      joined_vertices_.items.push_back(
-          {m.rod, m.vertex, range.slot(m.vertex), rods_[first.rod].slot(first.vertex), k});
+      joined_vertices_.items.push_back({m.rod, m.vertex, range.slot(m.vertex), rods_[first.rod].slot(first.vertex), k});
       island = {std::min(island.begin, islands_[m.rod].begin), std::max(island.end, islands_[m.rod].end)};
       if (m.group < 0 || !range.twist) continue;
       for (const bool ends : {true, false}) {

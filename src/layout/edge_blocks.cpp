@@ -100,9 +100,8 @@ double EdgeBlocks::magnitude(const RodRange &rod, std::span<const JoinedEdge> jo
   for (const JoinedEdge &j : joined_edges)
     for (int r = 0; r < 3; ++r) {
       for (int c = r; c < 3; ++c)
-        sum += std::pow((r == c ? 1 : 2) * entry(rod, vertex(r, c))[j.frame - rod.first_slot] * x[r][j.frame] *
-                            x[c][j.frame],
-                        2);
+        sum += std::pow(
+            (r == c ? 1 : 2) * entry(rod, vertex(r, c))[j.frame - rod.first_slot] * x[r][j.frame] * x[c][j.frame], 2);
       for (int c = 0; c < edge_size; ++c) {
         const double d = c == 3 ? x[3][rod.slot(j.edge)] : x[c][rod.slot(j.edge + 1)] - x[c][rod.slot(j.edge)];
         sum += std::pow(2 * entry(rod, across(r, c))[j.cell - rod.first_slot] * x[r][j.frame] * d, 2);

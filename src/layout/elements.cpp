@@ -129,7 +129,8 @@ private:
     const Frame drawn{at.tangent, orthonormalised(at.director, at.tangent), 1};
     out_.joined_frame_[&j - out_.joined_edges_.items.data()] = drawn;
     const int edge = range_.slot(j.edge), middle = place(j.vertex);
-    loose_.push_back(j.ends ? LooseCell{j.cell, edge, j.frame, middle, 1} : LooseCell{j.cell, j.frame, edge, middle, 0});
+    loose_.push_back(j.ends ? LooseCell{j.cell, edge, j.frame, middle, 1}
+                            : LooseCell{j.cell, j.frame, edge, middle, 0});
     const auto &[flexural, torsional] = std::pair(rod_.material.flexural_stiffness, rod_.material.torsional_stiffness);
     if (j.ends)
       add(j.cell, f, drawn, 0.5 * f.length, {0.5, 0}, {1, 0}, flexural, torsional);
@@ -168,8 +169,8 @@ private:
 
 Elements::Elements(const Scene &scene, const DofMap &dofs)
     : rods(dofs.rods()), slots(dofs.slots()), loose(rods.size()), end_couples(rods.size()),
-      support_slot(scene.supports.size(), -1), rod_cells{0}, groups(dofs.groups()),
-      joined_edges_(dofs.joinedEdges()), joined_vertices_(dofs.joinedVertices()) {
+      support_slot(scene.supports.size(), -1), rod_cells{0}, groups(dofs.groups()), joined_edges_(dofs.joinedEdges()),
+      joined_vertices_(dofs.joinedVertices()) {
   std::vector<int> free_slots; ///< per rod, behind those of its supports
   constants_ = Planes(7, slots);
   joined_frame_.resize(joined_edges_.items.size());

@@ -153,8 +153,8 @@ template <class T> void BandedFactor::factorGroup(const Group &group, const Band
     zero = elimination.zero;
   };
   auto eliminate = [&]<bool ring, bool joined>(const auto &read) {
-    run(Elimination<T, ring ? Border::ring : Border::none, joined, std::decay_t<decltype(read)>>({0, first.edges}, held,
-                                                                                                 read, records));
+    run(Elimination < T, ring ? Border::ring : Border::none, joined,
+        std::decay_t < decltype(read) >> ({0, first.edges}, held, read, records));
   };
   if (first.closed)
     joins ? eliminate.template operator()<true, true>(rare) : eliminate.template operator()<true, false>(rare);

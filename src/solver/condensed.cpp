@@ -4,146 +4,14 @@
 #include "tendril/solver/factor_type.hpp"
 #include "tendril/solver/substitution.hpp"
 
-#include <petscblaslapack.h>
-
-#include <Eigen/Dense>
-
 #include <algorithm>
-#include <map>
-#include <numeric>
-#include <tuple>
 
 namespace tendril {
 namespace {
 
 template <class T> T *as(double *p) { return reinterpret_cast<T *>(p); }
 
-/// By LAPACK, with pivoting.
-class DenseSchur final : public Schur {
-public:
-  DenseSchur(int size, std::vector<int> rows, std::vector<int> columns)
-      : rows_(std::move(rows)), columns_(std::move(columns)), matrix_(size, size), pivots_(size) {}
-
-  bool factor(const std::vector<double> &values) override {
-    PetscBLASInt n = PetscBLASInt(pivots_.size()), length = 64 * n, info;
-    work_.resize(length);
-    matrix_.setZero();
-    for (std::size_t k = 0; k < values.size(); ++k) matrix_(rows_[k], columns_[k]) += values[k];
-    LAPACKsytrf_("L", &n, matrix_.data(), &n, pivots_.data(), work_.data(), &length, &info);
-    negative = 0;
-    for (PetscBLASInt k = 0; k < n; ++k)
-      if (pivots_[k] > 0)
-        negative += matrix_(k, k) < 0;
-      else { // a block of two has one of each sign
-        ++negative;
-        ++k;
-      }
-    return info == 0;
-  }
-  void solve(std::vector<double> &x) override {
-    PetscBLASInt n = PetscBLASInt(pivots_.size()), one = 1, info;
-    LAPACKsytrs_("L", &n, &one, matrix_.data(), &n, pivots_.data(), x.data(), &n, &info);
-  }
-  const char *kind() const override { return "dense, LAPACK"; }
-
-private:
-  std::vector<int> rows_, columns_;
-  Eigen::MatrixXd matrix_;
-  std::vector<PetscBLASInt> pivots_;
-  std::vector<double> work_;
-};
-
-/// By PETSc, without pivoting.
-class SparseSchur final : public Schur {
-public:
-  SparseSchur(int size, const std::vector<int> &rows, const std::vector<int> &columns) : size_(size) {
-    (void)make(std::vector<PetscInt>(rows.begin(), rows.end()), std::vector<PetscInt>(columns.begin(), columns.end()));
-  }
-  bool factor(const std::vector<double> &values) override {
-    bool regular = false;
-    return factorWith(values, &regular) == 0 && regular;
-  }
-  void solve(std::vector<double> &x) override { (void)solveWith(x); }
-  const char *kind() const override { return "sparse, PETSc's Cholesky by minimum degree"; }
-
-private:
-  PetscInt size_;
-  OwnedMat matrix_, factor_;
-  OwnedVec right_, solution_;
-
-  PetscErrorCode make(std::vector<PetscInt> rows, std::vector<PetscInt> columns) {
-    IS row, column;
-    MatFactorInfo info;
-    PetscFunctionBegin;
-    PetscCall(MatCreate(PETSC_COMM_SELF, matrix_.out()));
-    PetscCall(MatSetSizes(matrix_, size_, size_, size_, size_));
-    PetscCall(MatSetType(matrix_, MATSEQAIJ));
-    PetscCall(MatSetOption(matrix_, MAT_SYMMETRIC, PETSC_TRUE));
-    PetscCall(MatSetPreallocationCOO(matrix_, PetscCount(rows.size()), rows.data(), columns.data()));
-    const std::vector<double> none(rows.size(), 0.0);
-    PetscCall(MatSetValuesCOO(matrix_, none.data(), INSERT_VALUES));
-    PetscCall(MatGetFactor(matrix_, MATSOLVERPETSC, MAT_FACTOR_CHOLESKY, factor_.out()));
-    PetscCall(MatGetOrdering(matrix_, MATORDERINGAMD, &row, &column));
-    PetscCall(MatFactorInfoInitialize(&info));
-    PetscCall(MatCholeskyFactorSymbolic(factor_, matrix_, row, &info));
-    PetscCall(ISDestroy(&row));
-    PetscCall(ISDestroy(&column));
-    PetscCall(MatCreateVecs(matrix_, right_.out(), solution_.out()));
-    PetscFunctionReturn(0);
-  }
-  PetscErrorCode factorWith(const std::vector<double> &values, bool *regular) {
-    MatFactorInfo info;
-    MatFactorError error;
-    PetscInt minus, none, plus;
-    PetscFunctionBegin;
-    PetscCall(MatSetValuesCOO(matrix_, values.data(), INSERT_VALUES));
-    PetscCall(MatFactorInfoInitialize(&info));
-    info.zeropivot = 1e-250;
-    PetscCall(MatFactorClearError(factor_));
-    PetscCall(MatCholeskyFactorNumeric(factor_, matrix_, &info));
-    PetscCall(MatFactorGetError(factor_, &error));
-    *regular = error == MAT_FACTOR_NOERROR;
-    if (!*regular) PetscFunctionReturn(0);
-    PetscCall(MatGetInertia(factor_, &minus, &none, &plus));
-    negative = int(minus);
-    PetscFunctionReturn(0);
-  }
-  PetscErrorCode solveWith(std::vector<double> &x) {
-    const double *out;
-    PetscFunctionBegin;
-    PetscCall(VecPlaceArray(right_, x.data()));
-    PetscCall(MatSolve(factor_, right_, solution_));
-    PetscCall(VecResetArray(right_));
-    PetscCall(VecGetArrayRead(solution_, &out));
-    std::copy_n(out, x.size(), x.begin());
-    PetscCall(VecRestoreArrayRead(solution_, &out));
-    PetscFunctionReturn(0);
-  }
-};
-
-constexpr int most_dense = 200; ///< unknowns of a Schur complement
-
 } // namespace
-
-/// Whether a rod that bends runs through a junction without a frame.
-static bool runsThrough(const DofMap &dofs, const JoinedVertex &j) {
-  const RodRange &rod = dofs.rods()[j.rod];
-  if (!rod.twist || j.vertex == 0 || j.vertex == rod.edges) return false;
-  const auto edges = dofs.joinedEdges({j.rod, j.rod + 1});
-  return std::none_of(edges.begin(), edges.end(), [&](const JoinedEdge &e) { return e.vertex == j.vertex; });
-}
-
-bool CondensedFactor::suits(const DofMap &dofs, RodSet rods) {
-  for (int r = rods.begin; r < rods.end; ++r)
-    if (dofs.rods()[r].closed) return false;
-  for (const JoinedVertex &j : dofs.joinedVertices(rods)) {
-    if (!runsThrough(dofs, j)) continue;
-    if (dofs.isHeld(dofs.rods()[j.rod].first_vertex + j.vertex + 1)) return false;
-    for (const JoinedVertex &other : dofs.joinedVertices({j.rod, j.rod + 1}))
-      if (other.vertex == j.vertex + 1) return false;
-  }
-  return true;
-}
 
 CondensedFactor::CondensedFactor(const DofMap &dofs, RodSet rods, BandedWorkspace &workspace)
     : dofs_(dofs), rods_(rods), workspace_(workspace) {
@@ -152,145 +20,7 @@ CondensedFactor::CondensedFactor(const DofMap &dofs, RodSet rods, BandedWorkspac
   group(row, column);
   entries_.resize(row.size());
   separators_.resize(unknown_.size());
-  if (int(unknown_.size()) <= most_dense)
-    schur_ = std::make_unique<DenseSchur>(int(unknown_.size()), std::move(row), std::move(column));
-  else
-    schur_ = std::make_unique<SparseSchur>(int(unknown_.size()), row, column);
-}
-
-/// Numbers the unknowns of the junctions, and cuts the rods there.
-void CondensedFactor::cut() {
-  const PetscInt first = dofs_.firstUnknown(rods_);
-  std::map<int, int> number; // of the first of three unknowns, by the slot that has them
-  for (const JoinedVertex &j : dofs_.joinedVertices(rods_)) number.try_emplace(j.first_slot, 0);
-  for (const JoinedEdge &j : dofs_.joinedEdges(rods_)) number.try_emplace(j.first_frame, 0);
-  for (auto &[slot, begin] : number) {
-    begin = dofs_.unknown(slot, 0) < 0 ? -1 : int(unknown_.size());
-    for (int a = 0; a < 3 && begin >= 0; ++a) unknown_.push_back(int(dofs_.unknown(slot, a) - first));
-  }
-  std::map<int, int> edge_number; // of the vector and the twist of an edge that a rod runs through with, by its slot
-  for (const JoinedVertex &j : dofs_.joinedVertices(rods_)) {
-    if (!runsThrough(dofs_, j)) continue;
-    edge_number[j.slot] = int(unknown_.size());
-    unknown_.insert(unknown_.end(), 3, -1);
-    unknown_.push_back(int(dofs_.unknown(j.slot, 3) - first));
-  }
-  auto places = [&](const JoinedVertex &j, const JoinedEdge *edge) {
-    Places p;
-    p.fill(-1);
-    for (int a = 0; a < 3; ++a) {
-      if (const int begin = number.at(j.first_slot); begin >= 0) p[a] = begin + a;
-      if (edge) p[edge_at + a] = number.at(edge->first_frame) + a;
-    }
-    if (const auto through = edge_number.find(j.slot); through != edge_number.end())
-      for (int c = 0; c < edge_size; ++c) p[edge_at + c] = through->second + c;
-    return p;
-  };
-  for (int r = rods_.begin; r < rods_.end; ++r) {
-    const RodRange &rod = dofs_.rods()[r];
-    std::vector<const JoinedVertex *> cuts;
-    for (const JoinedVertex &j : dofs_.joinedVertices({r, r + 1})) cuts.push_back(&j);
-    std::sort(cuts.begin(), cuts.end(),
-              [](const JoinedVertex *a, const JoinedVertex *b) { return a->vertex < b->vertex; });
-    auto frameOf = [&](int edge, int vertex) -> const JoinedEdge * {
-      for (const JoinedEdge &j : dofs_.joinedEdges({r, r + 1}))
-        if (j.edge == edge && j.vertex == vertex) return &j;
-      return nullptr;
-    };
-    const JoinedVertex *near = nullptr;
-    auto add = [&](int begin, int end, const JoinedVertex *far) {
-      if (begin == end) return;
-      Run run{r,  begin, end - begin, near != nullptr, far != nullptr, near && runsThrough(dofs_, *near),
-              far && runsThrough(dofs_, *far), {}, {}, nullptr, nullptr, {}};
-      run.near.fill(-1);
-      run.far.fill(-1);
-      if (near) run.near_frame = frameOf(begin, begin);
-      if (near) run.near = places(*near, run.near_frame);
-      if (far) run.far_frame = frameOf(end - 1, end);
-      if (far) run.far = places(*far, run.far_frame);
-      for (int v = begin; v <= end; ++v) run.held.push_back(dofs_.isHeld(rod.first_vertex + v));
-      if (near) run.held.front() = false; // what a separator is held by is left out of it
-      if (far) run.held.back() = false;
-      runs_.push_back(std::move(run));
-    };
-    int begin = 0;
-    for (const JoinedVertex *c : cuts) {
-      add(begin, c->vertex, c);
-      near = c;
-      begin = c->vertex;
-    }
-    add(begin, rod.edges, nullptr);
-  }
-}
-
-/// Runs of one shape together, a pack of them where that is cheaper, and where their parts of the Schur complement go.
-void CondensedFactor::group(std::vector<int> &rows, std::vector<int> &columns) {
-  constexpr int worth_a_pack = 3;
-  std::vector<int> order(runs_.size());
-  std::iota(order.begin(), order.end(), 0);
-  auto shape = [&](int k) {
-    const Run &run = runs_[k];
-    return std::tie(run.edges, run.from_separator, run.to_separator, run.from_through, run.to_through, run.held);
-  };
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return shape(a) < shape(b); });
-  auto block = [&](const Places &row, const Places &column) {
-    for (int r = 0; r < state_size; ++r)
-      for (int c = 0; c < state_size; ++c)
-        if (row[r] >= 0 && column[c] >= 0) {
-          rows.push_back(row[r]);
-          columns.push_back(column[c]);
-        }
-  };
-  std::size_t records = 0, values = 0;
-  auto close = [&](const int *run, int count, bool packed) {
-    Group g{};
-    g.count = count;
-    g.packed = packed;
-    for (int l = 0; l < lanes; ++l) g.run[l] = run[l < count ? l : 0];
-    const Run &one = runs_[run[0]];
-    const std::size_t wide = packed ? lanes : 1;
-    auto perEdge = [&]<class T>(T) { return one.to_separator ? Record<T>::bordered : Record<T>::plain; };
-    g.record = records;
-    g.value = values;
-    records += wide * (bordered_vertex_record + one.edges * std::size_t(packed ? perEdge(Pack()) : perEdge(0.0)));
-    // Behind, the first vertex while separators are solved for; packs begin at their multiples.
-    values += wide * ((slot_size * (one.edges + 2) + lanes - 1) / lanes * lanes);
-    for (int l = 0; l < count; ++l) {
-      const Run &of = runs_[run[l]];
-      g.entry[l] = int(rows.size());
-      block(of.near, of.near);
-      block(of.near, of.far);
-      block(of.far, of.near);
-      block(of.far, of.far);
-    }
-    groups_.push_back(g);
-  };
-  for (std::size_t k = 0; k < order.size();) {
-    std::size_t end = k;
-    while (end < order.size() && end < k + lanes && shape(order[end]) == shape(order[k])) ++end;
-    if (end - k >= worth_a_pack)
-      close(&order[k], int(end - k), true);
-    else
-      for (std::size_t i = k; i < end; ++i) close(&order[i], 1, false);
-    k = end;
-  }
-  records_.resize(records);
-  values_.resize(values);
-  own_entries_ = rows.size();
-  for (const Run &run : runs_) // what separators have by themselves: last vertices ...
-    if (run.to_separator && run.begin + run.edges == dofs_.rods()[run.rod].edges)
-      for (int r = 0; r < 3; ++r)
-        for (int c = 0; c < 3 && run.far[r] >= 0; ++c) {
-          rows.push_back(run.far[r]);
-          columns.push_back(run.far[c]);
-        }
-  for (const Run &run : runs_) // ... and frames
-    for (const auto &[frame, places] : {std::pair(run.near_frame, &run.near), std::pair(run.far_frame, &run.far)})
-      for (int r = 0; r < 3 && frame; ++r)
-        for (int c = 0; c < 3; ++c) {
-          rows.push_back((*places)[edge_at + r]);
-          columns.push_back((*places)[edge_at + c]);
-        }
+  schur_ = makeSchur(int(unknown_.size()), std::move(row), std::move(column));
 }
 
 void CondensedFactor::factor(const BandedSystem &system) {
@@ -406,7 +136,8 @@ template <class T> void CondensedFactor::factorGroup(const Group &group, const B
   T *const vertex = as<T>(&records_[group.record]), *const records = vertex + bordered_vertex_record;
   T negative(0.0), zero(0.0);
   auto eliminate = [&]<Border border, bool joins>(const auto &read) {
-    Elimination<T, border, joins, std::decay_t<decltype(read)>> elimination({0, end, first.from_through}, first.held, read, records);
+    Elimination<T, border, joins, std::decay_t<decltype(read)>> elimination({0, end, first.from_through}, first.held,
+                                                                            read, records);
     Block<T> near{}, between{}, far{};
     if (first.from_separator)
       elimination.runTo(near, between, far, vertex);
@@ -477,7 +208,8 @@ template <class T> void CondensedFactor::solveTo(const Group &group, const Petsc
   T near[state_size], far[state_size];
   T *const values = as<T>(&values_[group.value]);
   auto go = [&]<Border border>() {
-    Substitution<T, border>({0, first.edges, first.from_through}, first.held, records, vertex).toFirst(values, near, far);
+    Substitution<T, border>({0, first.edges, first.from_through}, first.held, records, vertex)
+        .toFirst(values, near, far);
   };
   first.to_separator ? go.template operator()<Border::separator>() : go.template operator()<Border::none>();
   if (!first.from_separator) {
@@ -508,7 +240,7 @@ template <class T> void CondensedFactor::solveFrom(const Group &group, PetscScal
   const T *const vertex = as<T>(&records_[group.record]), *const records = vertex + bordered_vertex_record;
   T near[state_size], far[state_size];
   T *const values = as<T>(&values_[group.value]);
-  auto ends = [&](const Places Run::*places, T (&to)[state_size]) {
+  auto ends = [&](const Places Run::*places, T(&to)[state_size]) {
     for (int k = 0; k < state_size; ++k) {
       auto of_lane = [&](int l) {
         const int place = (runs_[group.run[l]].*places)[k];
@@ -528,7 +260,8 @@ template <class T> void CondensedFactor::solveFrom(const Group &group, PetscScal
       near[r] -= vertex[vertex_record + r * state_size + c] * far[c];
   }
   auto go = [&]<Border border>() {
-    Substitution<T, border>({0, first.edges, first.from_through}, first.held, records, vertex).fromFirst(near, far, values);
+    Substitution<T, border>({0, first.edges, first.from_through}, first.held, records, vertex)
+        .fromFirst(near, far, values);
   };
   first.to_separator ? go.template operator()<Border::separator>() : go.template operator()<Border::none>();
   eachValue<T>(group, [&](double &value, PetscInt u) {
@@ -541,7 +274,8 @@ bool canCondense(const DofMap &dofs, RodSet rods) { return CondensedFactor::suit
 
 PetscErrorCode CondensedFactor::view(PetscViewer viewer) const {
   PetscFunctionBegin;
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  %d runs of rods between %d unknowns of junctions: their Schur complement is %s\n",
+  PetscCall(PetscViewerASCIIPrintf(viewer,
+                                   "  %d runs of rods between %d unknowns of junctions: their Schur complement is %s\n",
                                    int(runs_.size()), int(unknown_.size()), schur_->kind()));
   PetscFunctionReturn(0);
 }

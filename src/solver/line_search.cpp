@@ -40,8 +40,8 @@ bool NewtonSolver::residualFalls(RodSet island, double length) {
 }
 
 /// Trial of joined rods at a length of their increment. Going straight, edges get longer by squares, which stiff ones
-/// must not: the factored Hessian takes that back, as a second-order correction does for constraints (Nocedal and Wright
-/// 2006, 18.3), wherever the rods are joined and held. False where it is impossible.
+/// must not: the factored Hessian takes that back, as a second-order correction does for constraints (Nocedal and
+/// Wright 2006, 18.3), wherever the rods are joined and held. False where it is impossible.
 bool NewtonSolver::tryCorrected(RodSet island, double length, double *free) {
   constexpr int sweeps = 2;
   constexpr double little = 1e-12; // of an edge
@@ -86,8 +86,7 @@ IncrementalPotential::RodEnergy NewtonSolver::tryLength(RodSet island, double le
   (void)PetscLogEventBegin(events().configuration, 0, 0, 0, 0);
   double free = 1;
   const RetractionKind kind = potential_->settings.retraction;
-  const bool corrects = kind == RetractionKind::length &&
-                        potential_->dofs().isJoined(island),
+  const bool corrects = kind == RetractionKind::length && potential_->dofs().isJoined(island),
              possible = corrects ? tryCorrected(island, length, &free)
                                  : potential_->tryMove(work_->increment, length, island, kind, work_->trial, &free);
   (void)PetscLogEventEnd(events().configuration, 0, 0, 0, 0);
@@ -122,8 +121,7 @@ NewtonSolver::Length NewtonSolver::judgeLength(RodSet island, double length, con
 }
 
 /// A length that is good; false where none is found. The trial is there, then.
-bool NewtonSolver::findLength(RodSet island, const Descent &d, double *lambda,
-                              IncrementalPotential::RodEnergy *there) {
+bool NewtonSolver::findLength(RodSet island, const Descent &d, double *lambda, IncrementalPotential::RodEnergy *there) {
   double low = 0, high = HUGE_VAL;
   *lambda = 1;
   for (int trial = 0; trial < most_trials; ++trial) {
@@ -168,8 +166,7 @@ bool NewtonSolver::standStill(RodSet island, double *lambda) {
 
 /// A full step that gained clearly more than a quadratic would: the minimum lies beyond, as on the way down from a
 /// barrier.
-void NewtonSolver::goBeyond(RodSet island, const Descent &d, double *lambda,
-                            IncrementalPotential::RodEnergy *there) {
+void NewtonSolver::goBeyond(RodSet island, const Descent &d, double *lambda, IncrementalPotential::RodEnergy *there) {
   const double gain = (there->value - d.before.value) / d.slope;
   if (potential_->settings.line_search != LineSearchKind::energy || d.free || *lambda != 1 ||
       !(gain > 0.6 && gain < 1) || !(-d.slope > 1e3 * d.before.noise))
@@ -198,8 +195,8 @@ bool NewtonSolver::search(RodSet island, double *lambda) {
   if (!std::isfinite(d.slope)) return false;
   d.before = {0, 0};
   // Where the symmetric part is indefinite, couples have nothing that an equilibrium would minimise.
-  d.free = seek_ == Seek::equilibrium || (potential_->step().isStatic() && circulatory_ &&
-                                          circulatory_->acts(island) && work_->negative[island.begin] > 0);
+  d.free = seek_ == Seek::equilibrium || (potential_->step().isStatic() && circulatory_ && circulatory_->acts(island) &&
+                                          work_->negative[island.begin] > 0);
   for (int r = island.begin; r < island.end; ++r) {
     const RodRange &rod = potential_->elements().rods[r];
     Standstill &standstill = work_->standstill[r];
@@ -252,8 +249,7 @@ PetscErrorCode NewtonSolver::lineSearch(SNESLineSearch search) {
     accepted = this->search(island, &lambda);
     if (!before.empty()) lengths_[n] = lambda;
     shortest = std::min(shortest, lambda);
-    for (int r = island.begin; r < island.end; ++r)
-      report_.edge_iterations += potential_->elements().rods[r].edges;
+    for (int r = island.begin; r < island.end; ++r) report_.edge_iterations += potential_->elements().rods[r].edges;
   }
   PetscCall(PetscLogEventEnd(events().line_search, 0, 0, 0, 0));
   PetscCall(SNESLineSearchSetLambda(search, shortest));

@@ -97,8 +97,7 @@ PetscErrorCode NewtonSolver::assemble(Mat) {
   secants_.clear();
   for (int r = rods_.begin; r < rods_.end; ++r)
     if (work_->active[r]) potential_->derivatives({r, r + 1});
-  for (const RodSet island : islands_)
-    fill(work_->shift, island, follows_ ? regular_lift * firstShift(island) : 0.0);
+  for (const RodSet island : islands_) fill(work_->shift, island, follows_ ? regular_lift * firstShift(island) : 0.0);
   PetscCall(refill());
   PetscFunctionReturn(0);
 }

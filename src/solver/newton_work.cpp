@@ -43,11 +43,11 @@ std::vector<double> edgeMetric(const IncrementalPotential &potential) {
 
 NewtonWork::NewtonWork(const IncrementalPotential &potential, int slots)
     : active(potential.all().end, true), shift(active.size(), 0), last_shift(shift), negative(active.size(), 0),
-      zero(negative), indefinite(active.size(), false), tried(active.size()), energy(active.size()), energy_known(active.size(), false),
-      residual(active.size()), moving(active.size(), false), standstill(active.size()), left(active.size(), 0),
-      load_reach(active.size(), 0), load_energy(active.size(), 0), increment(slot_size, slots), coordinates(increment),
-      trial(slots), motion(potential.dofs().makePlanes()), metric(shiftMetric(potential.elements(), potential.dofs())),
-      edge_metric(edgeMetric(potential)) {}
+      zero(negative), indefinite(active.size(), false), tried(active.size()), energy(active.size()),
+      energy_known(active.size(), false), residual(active.size()), moving(active.size(), false),
+      standstill(active.size()), left(active.size(), 0), load_reach(active.size(), 0), load_energy(active.size(), 0),
+      increment(slot_size, slots), coordinates(increment), trial(slots), motion(potential.dofs().makePlanes()),
+      metric(shiftMetric(potential.elements(), potential.dofs())), edge_metric(edgeMetric(potential)) {}
 
 void NewtonWork::setOrigin(int first_slot) {
   increment.setOrigin(first_slot);

@@ -69,7 +69,8 @@ Residual residualOf(const Elements &elements, const Material &m, const Step &ste
     error = max(error, select(live, Pack(abs(strain - force / read<Pack>(axial.stiffness() + s))), Pack(0.0)));
   }
   double moment = reduce(moments);
-  for (const JoinedEdge &j : elements.joinedEdges({index, index + 1})) moment += out_of_balance.vector(0, j.frame).squaredNorm();
+  for (const JoinedEdge &j : elements.joinedEdges({index, index + 1}))
+    moment += out_of_balance.vector(0, j.frame).squaredNorm();
   const double force = reduce(forces);
   // Edges carry errors of epsilon in their strains and directions, which the stiffnesses turn into forces and moments.
   const double strain_noise = edgeError(reach, scale.shortest_edge), count = std::sqrt(double(rod.vertices));

@@ -15,8 +15,8 @@ PetscErrorCode copyValues(Vec from, std::vector<double> *values) {
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Secants::apply(const DofMap &dofs, const std::vector<RodSet> &islands, const std::function<PetscErrorCode(Vec, Vec)> &solve,
-                              Vec f, Vec work, Vec y) const {
+PetscErrorCode Secants::apply(const DofMap &dofs, const std::vector<RodSet> &islands,
+                              const std::function<PetscErrorCode(Vec, Vec)> &solve, Vec f, Vec work, Vec y) const {
   PetscFunctionBeginUser;
   auto forIslands = [&](auto visit) {
     for (std::size_t n = 0; n < islands.size(); ++n) {
@@ -51,8 +51,8 @@ PetscErrorCode Secants::apply(const DofMap &dofs, const std::vector<RodSet> &isl
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Secants::add(const DofMap &dofs, const std::vector<RodSet> &islands, Vec direction, const std::vector<double> &lengths,
-                            const std::vector<double> &before, Vec f) {
+PetscErrorCode Secants::add(const DofMap &dofs, const std::vector<RodSet> &islands, Vec direction,
+                            const std::vector<double> &lengths, const std::vector<double> &before, Vec f) {
   PetscFunctionBeginUser;
   Pair secant;
   PetscCall(copyValues(direction, &secant.step));

@@ -224,8 +224,9 @@ std::string NewtonSolver::unstableRod() const {
   for (const RodSet island : islands_)
     if (const int r = island.begin, count = work_->negative[r]; count > 0)
       return "; " + labelOf(potential_->scene().rods[r]) +
-             (island.end > r + 1 ? " and " + std::to_string(island.end - r - 1) + " more" : "") + ": forces and moments are in balance, and " +
-             std::to_string(count) + (count == 1 ? " motion lowers" : " motions lower") + " its energy";
+             (island.end > r + 1 ? " and " + std::to_string(island.end - r - 1) + " more" : "") +
+             ": forces and moments are in balance, and " + std::to_string(count) +
+             (count == 1 ? " motion lowers" : " motions lower") + " its energy";
   return "";
 }
 

@@ -91,8 +91,7 @@ void setSupports(const Scene &scene, const Elements &elements, double motion_tim
     if (elements.support_slot[s] >= 0)
       c.setFrame(elements.support_slot[s], supportFrame(scene.supports[s], motion_time));
   setTargets(scene, elements, motion_time, c);
-  if (scene.collidersMove())
-    c.setObstacleTimes(int(elements.rods.size()), motion_time);
+  if (scene.collidersMove()) c.setObstacleTimes(int(elements.rods.size()), motion_time);
 }
 
 void setTarget(const Constraint &constraint, int slot, double motion_time, Configuration &c) {

@@ -94,6 +94,18 @@ def exampleScene(path, value):
             put(scene, "colliders[].name", "floor")
         if name in ("threshold", "smoothing"):
             put(scene, path.rpartition(".")[0] + ".law", "penalty")
+    if path.startswith("junctions"):  # a second rod begins where the first one ends
+        put(scene, "rods[].line", {"from": [0, 0, 0], "to": [1, 0, 0], "edges": 6})
+        put(scene, "supports[].rod", 0)
+        scene["rods"].append({"line": {"from": [1, 0, 0], "to": [1, 1, 0], "edges": 6}, "material": "default"})
+        junction = scene["junctions"][0]
+        given = (junction.get("members") or [{}])[0]
+        junction["type"] = "ball" if "group" in given else junction.get("type", "rigid")
+        if path.startswith("junctions[].members"):
+            junction["members"] = [{"rod": 0, "vertex": "last", **given}, {"rod": 1, "vertex": 0, **{k: v for k, v in given.items() if k == "group"}}]
+        else:
+            junction.update({"shared": True} if junction.get("shared") is not False
+                            else {"members": [{"rod": 0, "vertex": "last"}, {"rod": 1, "vertex": 0}]})
     if path.startswith("supports[].motion"):
         scene["supports"][0]["type"] = "clamp"
     if not any(shape in scene.get("rods", [{}])[0] for shape in ("line", "ring", "helix", "points", "file")):

@@ -34,8 +34,8 @@ template <Measure measure> void expectMatch(RandomCell c, int frame) {
   c.cell.weight[frame] = 0;
   c.cell.free = {frame == 0 ? 0.0 : 1.0, frame == 0 ? 1.0 : 0.0}; // as cells have it; both turn all the same
   const FrameOf<D> joint{turned(turns.tangent), turned(turns.director), D(1.0)}, edge = moved(frame == 0 ? c.f1 : c.f0);
-  const D exact =
-      frame == 0 ? cellEnergy<measure>(joint, edge, cast<D>(c.cell)) : cellEnergy<measure>(edge, joint, cast<D>(c.cell));
+  const D exact = frame == 0 ? cellEnergy<measure>(joint, edge, cast<D>(c.cell))
+                             : cellEnergy<measure>(edge, joint, cast<D>(c.cell));
   const JointCellDerivatives d = jointCellDerivatives<measure>(c.f0, c.f1, c.cell, frame);
   Eigen::Matrix<double, 7, 1> gradient;
   gradient << d.spin, d.edge;

@@ -91,7 +91,7 @@ TEST(Junctions, BallsMakeTrusses) {
   scene.forces = {{0, 4, Vec3(0, -load, 0)}};
   Simulation sim;
   runTo(sim, scene, statics());
-  const double down = load * std::sqrt(2.0) / (2 * 1e5 * 0.5); // sin^2 of 45 degrees
+  const double down = load * std::sqrt(2.0) / (2 * 1e5 * 0.5);  // sin^2 of 45 degrees
   EXPECT_NEAR(1 - sim.state.position[4][1], down, 1e-3 * down); // bending bears B/(EA L^2) of it
 }
 
@@ -103,7 +103,8 @@ TEST(Junctions, OrderDoesNotMatter) {
     const Vec3 feet[] = {{1, 0, 0}, {-0.5, 0.8, 0}, {-0.5, -0.8, 0.1}};
     for (const int k : order) scene.rods.push_back(member(Vec3(0, 0, 1), feet[k], 8, std::to_string(k)));
     std::vector<Junction::Member> members;
-    for (const int k : {0, 1, 2}) members.push_back({int(std::find(order.begin(), order.end(), k) - order.begin()), 0, 0});
+    for (const int k : {0, 1, 2})
+      members.push_back({int(std::find(order.begin(), order.end(), k) - order.begin()), 0, 0});
     scene.junctions = {join(members, true)};
     for (const int r : {0, 1, 2})
       scene.supports.push_back(hold(scene, r, 8, order[r] == 0 ? Support::Kind::clamp : Support::Kind::pin));
@@ -149,8 +150,8 @@ TEST(Junctions, EnergyIsKeptAsByAWholeRod) {
       gained[cut] = end.total() - start.total();
       stored = end.kinetic + end.bend;
     }
-    EXPECT_LT(std::abs(gained[1]), 1e-4 * stored) << method;                // of second order in the step
-    EXPECT_NEAR(gained[1], gained[0], 1e-5 * stored) << method;             // the frame has no mass: it adds nothing
+    EXPECT_LT(std::abs(gained[1]), 1e-4 * stored) << method;    // of second order in the step
+    EXPECT_NEAR(gained[1], gained[0], 1e-5 * stored) << method; // the frame has no mass: it adds nothing
     EXPECT_GT(stored, 0.1) << method;
   }
 }

@@ -29,7 +29,7 @@ void draw(Net &net, Random &random, int rods, int nodes, bool frames) {
   std::vector<Vec3> places;
   for (int k = 0; k < nodes; ++k) {
     places.push_back(3 * random.vector());
-    Junction junction{"j" + std::to_string(k), {}, 0};
+    Junction junction{"j", {}, 0};
     if (frames && random() > -0.5) junction.groups = 1;
     net.scene.junctions.push_back(junction);
   }
@@ -78,8 +78,7 @@ void fill(Net &net, Random &random, double diagonal) {
     for (int i = 0; i < rod.edges; ++i)
       for (int r = 0; r < edge_size; ++r)
         for (int c = r; c < edge_size; ++c)
-          if (rod.twist || c < 3)
-            net.blocks.entry(rod, EdgeBlocks::own(r, c))[i] = random() + (r == c ? diagonal : 0);
+          if (rod.twist || c < 3) net.blocks.entry(rod, EdgeBlocks::own(r, c))[i] = random() + (r == c ? diagonal : 0);
     const int index = int(&rod - net.dofs.rods().data());
     const auto joined = net.dofs.joinedEdges({index, index + 1});
     for (int i = 1; i < rod.edges; ++i) {

@@ -76,10 +76,10 @@ public:
 
 private:
   Planes constants_, cells_;
-  std::vector<double> length_;                ///< per rod
+  std::vector<double> length_; ///< per rod
   ByRod<JoinedEdge> joined_edges_;
   ByRod<JoinedVertex> joined_vertices_;
-  std::vector<Frame> joined_frame_; ///< as drawn, of unit length
+  std::vector<Frame> joined_frame_;           ///< as drawn, of unit length
   std::vector<std::vector<int>> constraints_; ///< per rod
   std::vector<Pins> pins_;                    ///< per rod
   Pins no_pins_;

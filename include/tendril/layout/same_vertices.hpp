@@ -9,7 +9,8 @@ namespace tendril {
 /// Calls visit(rod, vertex) for all vertices that are one point with a vertex; for itself where nothing joins it.
 template <class Visit> void forSameVertices(const Elements &elements, int rod, int vertex, Visit visit) {
   const auto of_rod = elements.joinedVertices({rod, rod + 1});
-  const auto own = std::find_if(of_rod.begin(), of_rod.end(), [&](const JoinedVertex &j) { return j.vertex == vertex; });
+  const auto own =
+      std::find_if(of_rod.begin(), of_rod.end(), [&](const JoinedVertex &j) { return j.vertex == vertex; });
   if (own == of_rod.end()) return visit(rod, vertex);
   for (const JoinedVertex &j : elements.joinedVertices({0, int(elements.rods.size())}))
     if (j.junction == own->junction) visit(j.rod, j.vertex);

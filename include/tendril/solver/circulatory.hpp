@@ -47,10 +47,10 @@ private:
   std::vector<RodSet> islands_;
   std::vector<EdgeMoment> couples_; ///< by rod
   int countOn(RodSet island) const;
-  std::vector<Column> columns_;     ///< two for each couple
-  std::vector<double> strength_;    ///< half of |M| for each couple [N m]
-  Planes right_;                    ///< of the islands, as those solved
-  std::vector<Planes> solved_;      ///< the k-th columns of all islands, solved
+  std::vector<Column> columns_;  ///< two for each couple
+  std::vector<double> strength_; ///< half of |M| for each couple [N m]
+  Planes right_;                 ///< of the islands, as those solved
+  std::vector<Planes> solved_;   ///< the k-th columns of all islands, solved
 };
 
 } // namespace tendril

@@ -9,22 +9,9 @@
 
 #include "tendril/solver/banded.hpp"
 #include "tendril/solver/pivots.hpp"
-
-#include <memory>
+#include "tendril/solver/schur.hpp"
 
 namespace tendril {
-
-/// A symmetric matrix over the separators: entries are added, then it is factored.
-class Schur {
-public:
-  virtual ~Schur() = default;
-  /// Takes the values for the entries that it was made with, in their order; those of one place add up.
-  /// \return whether it could be factored
-  virtual bool factor(const std::vector<double> &values) = 0;
-  virtual void solve(std::vector<double> &x) = 0;
-  virtual const char *kind() const = 0;
-  int negative = 0;
-};
 
 class CondensedFactor {
 public:
@@ -53,14 +40,14 @@ private:
     bool from_through, to_through; ///< whether the rod runs on there, with its first edge and twist for unknowns
     Places near, far;
     const JoinedEdge *near_frame = nullptr, *far_frame = nullptr; ///< to which its first and last edge are tied
-    std::vector<char> held; ///< of its vertices
+    std::vector<char> held;                                       ///< of its vertices
   };
   /// Runs factored together, as in BandedFactor.
   struct Group {
     std::array<int, lanes> run;
     int count;
     bool packed;
-    std::size_t record, value; ///< where its factor and its values begin
+    std::size_t record, value;    ///< where its factor and its values begin
     std::array<int, lanes> entry; ///< where its part of the Schur complement begins
   };
   const DofMap &dofs_;

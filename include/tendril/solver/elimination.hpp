@@ -14,7 +14,8 @@ namespace tendril {
 template <class T, Border border, bool joins, class Read> class Elimination {
 public:
   Elimination(const RunRange &run, const std::vector<char> &held, const Read &read, T *records)
-      : begin_(run.begin), n_(run.end), last_(ring ? n_ - 1 : n_), keeps_first_(run.keeps_first), held_(held), read_(read), records_(records) {}
+      : begin_(run.begin), n_(run.end), last_(ring ? n_ - 1 : n_), keeps_first_(run.keeps_first), held_(held),
+        read_(read), records_(records) {}
 
   /// \param first receives L and inverse pivots of the first vertex
   [[gnu::flatten]] void run(T *first) {
@@ -117,7 +118,9 @@ private:
   T first_mixed_{0.0};       ///< its largest entry so far
   int bordered_from_ = 0;    ///< edges before it have no border any more
 
-  T *record(int i) const { return records_ + std::size_t(i - begin_) * (bordered ? Record<T>::bordered : Record<T>::plain); }
+  T *record(int i) const {
+    return records_ + std::size_t(i - begin_) * (bordered ? Record<T>::bordered : Record<T>::plain);
+  }
   bool nextHeld(int i) const { return held_[ring && i == last_ ? 0 : i + 1]; }
   T joined(int r, int c, int i) const { return read_(EdgeBlocks::joined(r, c), i); }
   T own(int r, int c, int i) const { return read_(EdgeBlocks::own(std::min(r, c), std::max(r, c)), i); }
@@ -333,8 +336,8 @@ private:
     for (int k = 0; k < state_size; ++k) state_[k] = next[k];
   }
 
-  /// The last edge of a ring ends where the first begins, e = x_0 - x, and meets it in the cell behind the ring; that of
-  /// a run ends in a separator.
+  /// The last edge of a ring ends where the first begins, e = x_0 - x, and meets it in the cell behind the ring; that
+  /// of a run ends in a separator.
   void closeRing() {
     const int i = n_ - 1;
     Square<T> next;

@@ -14,8 +14,8 @@ public:
   /// \param first record of the first vertex
   Substitution(const RunRange &run, const std::vector<char> &held, const T *records, const T *first)
       : begin_(run.begin), end_(run.end), first_(run.keeps_first ? begin_ + 1 : begin_), last_(ring ? end_ - 1 : end_),
-        border_end_(bordered ? std::max(ring ? begin_ + 1 : begin_, int(firstLane(first[border_begin]))) : 0), held_(held),
-        records_(records) {}
+        border_end_(bordered ? std::max(ring ? begin_ + 1 : begin_, int(firstLane(first[border_begin]))) : 0),
+        held_(held), records_(records) {}
 
   /// Of the right-hand side in `values`, four numbers a slot of the rod, leaves what the first vertex and the edge
   /// before it get in `near`, and what the border gets in `far`.

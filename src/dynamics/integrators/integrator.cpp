@@ -87,7 +87,8 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
                  damping = potential.scene().rods[j.rod].material.mass_damping_coefficient;
     const int v = elements.rods[j.rod].first_vertex + j.vertex;
     if (whole > 0)
-      a.vertex[v] = -potential.gradient(j.rod).equilibrium.vector(0, j.first_slot) / whole - damping * state.velocity[v];
+      a.vertex[v] =
+          -potential.gradient(j.rod).equilibrium.vector(0, j.first_slot) / whole - damping * state.velocity[v];
   }
   return a;
 }

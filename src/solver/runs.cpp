@@ -1,0 +1,176 @@
+/// How `condensed` cuts rods into runs, and which it factors together.
+#include "tendril/solver/condensed.hpp"
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+#include <tuple>
+
+namespace tendril {
+
+/// Whether a rod that bends runs through a junction without a frame.
+static bool runsThrough(const DofMap &dofs, const JoinedVertex &j) {
+  const RodRange &rod = dofs.rods()[j.rod];
+  if (!rod.twist || j.vertex == 0 || j.vertex == rod.edges) return false;
+  const auto edges = dofs.joinedEdges({j.rod, j.rod + 1});
+  return std::none_of(edges.begin(), edges.end(), [&](const JoinedEdge &e) { return e.vertex == j.vertex; });
+}
+
+bool CondensedFactor::suits(const DofMap &dofs, RodSet rods) {
+  for (int r = rods.begin; r < rods.end; ++r)
+    if (dofs.rods()[r].closed) return false;
+  for (const JoinedVertex &j : dofs.joinedVertices(rods)) {
+    if (!runsThrough(dofs, j)) continue;
+    if (dofs.isHeld(dofs.rods()[j.rod].first_vertex + j.vertex + 1)) return false;
+    for (const JoinedVertex &other : dofs.joinedVertices({j.rod, j.rod + 1}))
+      if (other.vertex == j.vertex + 1) return false;
+  }
+  return true;
+}
+
+/// Numbers the unknowns of the junctions, and cuts the rods there.
+void CondensedFactor::cut() {
+  const PetscInt first = dofs_.firstUnknown(rods_);
+  std::map<int, int> number; // of the first of three unknowns, by the slot that has them
+  for (const JoinedVertex &j : dofs_.joinedVertices(rods_)) number.try_emplace(j.first_slot, 0);
+  for (const JoinedEdge &j : dofs_.joinedEdges(rods_)) number.try_emplace(j.first_frame, 0);
+  for (auto &[slot, begin] : number) {
+    begin = dofs_.unknown(slot, 0) < 0 ? -1 : int(unknown_.size());
+    for (int a = 0; a < 3 && begin >= 0; ++a) unknown_.push_back(int(dofs_.unknown(slot, a) - first));
+  }
+  std::map<int, int> edge_number; // of the vector and the twist of an edge that a rod runs through with, by its slot
+  for (const JoinedVertex &j : dofs_.joinedVertices(rods_)) {
+    if (!runsThrough(dofs_, j)) continue;
+    edge_number[j.slot] = int(unknown_.size());
+    unknown_.insert(unknown_.end(), 3, -1);
+    unknown_.push_back(int(dofs_.unknown(j.slot, 3) - first));
+  }
+  auto places = [&](const JoinedVertex &j, const JoinedEdge *edge) {
+    Places p;
+    p.fill(-1);
+    for (int a = 0; a < 3; ++a) {
+      if (const int begin = number.at(j.first_slot); begin >= 0) p[a] = begin + a;
+      if (edge) p[edge_at + a] = number.at(edge->first_frame) + a;
+    }
+    if (const auto through = edge_number.find(j.slot); through != edge_number.end())
+      for (int c = 0; c < edge_size; ++c) p[edge_at + c] = through->second + c;
+    return p;
+  };
+  for (int r = rods_.begin; r < rods_.end; ++r) {
+    const RodRange &rod = dofs_.rods()[r];
+    std::vector<const JoinedVertex *> cuts;
+    for (const JoinedVertex &j : dofs_.joinedVertices({r, r + 1})) cuts.push_back(&j);
+    std::sort(cuts.begin(), cuts.end(),
+              [](const JoinedVertex *a, const JoinedVertex *b) { return a->vertex < b->vertex; });
+    auto frameOf = [&](int edge, int vertex) -> const JoinedEdge * {
+      for (const JoinedEdge &j : dofs_.joinedEdges({r, r + 1}))
+        if (j.edge == edge && j.vertex == vertex) return &j;
+      return nullptr;
+    };
+    const JoinedVertex *near = nullptr;
+    auto add = [&](int begin, int end, const JoinedVertex *far) {
+      if (begin == end) return;
+      Run run{r,
+              begin,
+              end - begin,
+              near != nullptr,
+              far != nullptr,
+              near && runsThrough(dofs_, *near),
+              far && runsThrough(dofs_, *far),
+              {},
+              {},
+              nullptr,
+              nullptr,
+              {}};
+      run.near.fill(-1);
+      run.far.fill(-1);
+      if (near) run.near_frame = frameOf(begin, begin);
+      if (near) run.near = places(*near, run.near_frame);
+      if (far) run.far_frame = frameOf(end - 1, end);
+      if (far) run.far = places(*far, run.far_frame);
+      for (int v = begin; v <= end; ++v) run.held.push_back(dofs_.isHeld(rod.first_vertex + v));
+      if (near) run.held.front() = false; // what a separator is held by is left out of it
+      if (far) run.held.back() = false;
+      runs_.push_back(std::move(run));
+    };
+    int begin = 0;
+    for (const JoinedVertex *c : cuts) {
+      add(begin, c->vertex, c);
+      near = c;
+      begin = c->vertex;
+    }
+    add(begin, rod.edges, nullptr);
+  }
+}
+
+/// Runs of one shape together, a pack of them where that is cheaper, and where their parts of the Schur complement go.
+void CondensedFactor::group(std::vector<int> &rows, std::vector<int> &columns) {
+  constexpr int worth_a_pack = 3;
+  std::vector<int> order(runs_.size());
+  std::iota(order.begin(), order.end(), 0);
+  auto shape = [&](int k) {
+    const Run &run = runs_[k];
+    return std::tie(run.edges, run.from_separator, run.to_separator, run.from_through, run.to_through, run.held);
+  };
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return shape(a) < shape(b); });
+  auto block = [&](const Places &row, const Places &column) {
+    for (int r = 0; r < state_size; ++r)
+      for (int c = 0; c < state_size; ++c)
+        if (row[r] >= 0 && column[c] >= 0) {
+          rows.push_back(row[r]);
+          columns.push_back(column[c]);
+        }
+  };
+  std::size_t records = 0, values = 0;
+  auto close = [&](const int *run, int count, bool packed) {
+    Group g{};
+    g.count = count;
+    g.packed = packed;
+    for (int l = 0; l < lanes; ++l) g.run[l] = run[l < count ? l : 0];
+    const Run &one = runs_[run[0]];
+    const std::size_t wide = packed ? lanes : 1;
+    auto perEdge = [&]<class T>(T) { return one.to_separator ? Record<T>::bordered : Record<T>::plain; };
+    g.record = records;
+    g.value = values;
+    records += wide * (bordered_vertex_record + one.edges * std::size_t(packed ? perEdge(Pack()) : perEdge(0.0)));
+    // Behind, the first vertex while separators are solved for; packs begin at their multiples.
+    values += wide * ((slot_size * (one.edges + 2) + lanes - 1) / lanes * lanes);
+    for (int l = 0; l < count; ++l) {
+      const Run &of = runs_[run[l]];
+      g.entry[l] = int(rows.size());
+      block(of.near, of.near);
+      block(of.near, of.far);
+      block(of.far, of.near);
+      block(of.far, of.far);
+    }
+    groups_.push_back(g);
+  };
+  for (std::size_t k = 0; k < order.size();) {
+    std::size_t end = k;
+    while (end < order.size() && end < k + lanes && shape(order[end]) == shape(order[k])) ++end;
+    if (end - k >= worth_a_pack)
+      close(&order[k], int(end - k), true);
+    else
+      for (std::size_t i = k; i < end; ++i) close(&order[i], 1, false);
+    k = end;
+  }
+  records_.resize(records);
+  values_.resize(values);
+  own_entries_ = rows.size();
+  for (const Run &run : runs_) // what separators have by themselves: last vertices ...
+    if (run.to_separator && run.begin + run.edges == dofs_.rods()[run.rod].edges)
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3 && run.far[r] >= 0; ++c) {
+          rows.push_back(run.far[r]);
+          columns.push_back(run.far[c]);
+        }
+  for (const Run &run : runs_) // ... and frames
+    for (const auto &[frame, places] : {std::pair(run.near_frame, &run.near), std::pair(run.far_frame, &run.far)})
+      for (int r = 0; r < 3 && frame; ++r)
+        for (int c = 0; c < 3; ++c) {
+          rows.push_back((*places)[edge_at + r]);
+          columns.push_back((*places)[edge_at + c]);
+        }
+}
+
+} // namespace tendril
