@@ -44,7 +44,7 @@ bool NewtonSolver::residualFalls(RodSet island, double length) {
 /// Wright 2006, 18.3), wherever the rods are joined and held. False where it is impossible.
 bool NewtonSolver::tryCorrected(RodSet island, double length, double *free) {
   constexpr int sweeps = 2;
-  constexpr double little = 1e-12; // of an edge
+  constexpr double little = 1e-12, too_long = 0.1; // of an edge
   const DofMap &dofs = potential_->dofs();
   Planes &step = work_->corrected, &response = work_->response;
   if (step.size() == 0) step = response = potential_->dofs().makePlanes();
@@ -62,7 +62,7 @@ bool NewtonSolver::tryCorrected(RodSet island, double length, double *free) {
     const bool possible = potential_->tryMove(step, 1, island, RetractionKind::additive, work_->trial, free);
     for (int r = island.begin; r < island.end && possible; ++r)
       potential_->setTrialForces(work_->increment, length, r, RetractionKind::length, work_->trial);
-    if (!possible || sweep == sweeps) return possible;
+    if (!possible) return false;
     each([&](int s) { response.setVector(0, s, Vec3::Zero()), response[3][s] = 0; });
     double most = 0;
     for (int r = island.begin; r < island.end; ++r) {
@@ -71,6 +71,7 @@ bool NewtonSolver::tryCorrected(RodSet island, double length, double *free) {
     }
     dofs.foldJoined(island, response);
     if (most < little) return true;
+    if (sweep == sweeps) return most < too_long; // where energies may rise, nothing else would stop it
     if (solveLinear(response, response)) return true;
     each([&](int s) {
       for (int a = 0; a < slot_size; ++a) step[a][s] -= response[a][s];

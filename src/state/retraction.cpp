@@ -300,7 +300,10 @@ static void moveAll(const RodRange &rod, const Vec3 &by, C &to) {
     const Frame after{rotation * before.tangent, rotation * before.director, 1};
     to.setFrame(j.frame, after);
     to.setPosition(j.frame, from.positionAt(j.frame) + turn, Vec3::Zero());
-    to[C::spin][j.frame] = from[C::spin][j.frame] + halfAngleBetween(before, after).angle();
+    // About its tangent, with the whole turns that the spin has.
+    const double principal = halfAngleBetween(before, after).angle(),
+                 about = 0.5 * turn.dot(before.tangent + after.tangent);
+    to[C::spin][j.frame] = from[C::spin][j.frame] + principal + 2 * pi * std::round((about - principal) / (2 * pi));
   }
   // Whole turns of the twist angle by continuity: the angle moves by the difference of the two spins, and by a little
   // holonomy. Half a turn is a barrier of the measure `tan`: no step leads across it.

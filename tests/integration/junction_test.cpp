@@ -118,6 +118,22 @@ TEST(Junctions, OrderDoesNotMatter) {
   EXPECT_LT((first.state.position[0] - other.state.position[0]).norm(), 1e-8);
 }
 
+/// A frame may turn by more than half a turn in one step: whole turns of the twist are those of a rod in one piece.
+TEST(Junctions, FramesTurnManyTimes) {
+  for (const bool cut : {false, true}) {
+    Scene scene = cantilever(cut, true);
+    for (Rod &rod : scene.rods) rod.material.torsional_stiffness = 0.1;
+    scene.forces.clear();
+    scene.moments = {{cut ? 1 : 0, cut ? 9 : 19, 1, Vec3::Zero()}};
+    Simulation sim;
+    runTo(sim, scene, statics());
+    double twist = 0;
+    for (int r = 0; r < int(sim.scene.rods.size()); ++r)
+      for (const double angle : RodAccess(sim, r).twists()) twist += angle;
+    EXPECT_NEAR(twist, 0.975 / 0.1, 1e-6) << cut; // up to the middle of the last edge
+  }
+}
+
 /// Iterations hardly grow with the axial stiffness, though straight steps stretch edges.
 TEST(Junctions, StiffRodsTakeNoMoreIterations) {
   std::vector<int> iterations;
