@@ -1,6 +1,7 @@
 #include "tendril/dynamics/state_access.hpp"
 
 #include "tendril/energy/edge.hpp"
+#include "tendril/layout/same_vertices.hpp"
 
 #include <algorithm>
 #include <sstream>
@@ -171,6 +172,10 @@ void RodAccess::setPositions(const std::vector<Vec3> &x) {
                   ", ", x[i][1], ", ", x[i][2], "); it moves by the motion of its support"));
       continue;
     }
+    for (const JoinedVertex &j : elements_.joinedVertices({index_, index_ + 1}))
+      if (j.vertex == i)
+        fail(text("vertex ", i, " is in junction '", scene_.junctions[j.junction].name,
+                  "', and cannot be put elsewhere by one of its rods"));
     next.position[v] = x[i];
     next.position_low[v].setZero();
   }
@@ -251,7 +256,9 @@ void RodAccess::setVelocities(const std::vector<Vec3> &v) {
   if (v == velocities()) return;
   State next = state_;
   for (int i = 0; i < range_.vertices; ++i)
-    if (!holds(i, &Support::holdsPosition)) next.velocity[range_.first_vertex + i] = v[i];
+    if (elements_.freedom()[range_.slot(i)] != 0)
+      forSameVertices(elements_, index_, i,
+                      [&](int rod, int vertex) { next.velocity[elements_.rods[rod].first_vertex + vertex] = v[i]; });
   accept(std::move(next));
 }
 

@@ -2,7 +2,9 @@
 #include "tendril/energy/edge.hpp"
 #include "tendril/solver/incremental_potential.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
+
 #include <map>
 
 namespace tendril {
@@ -99,19 +101,28 @@ double IncrementalPotential::addExcess(const Planes &increment, double scale, co
   return most;
 }
 
+/// A frame without mass turns so that the moments of its half cells stay in balance: by the mean of the spins of its
+/// edges, each with the stiffness of its half cell.
 void IncrementalPotential::turnFrames(RodSet islands, Planes &increment) const {
-  std::map<int, std::pair<Vec3, int>> spins; // by group
+  std::map<int, std::pair<Mat3, Vec3>> of_group;
   for (const JoinedEdge &j : elements_.joinedEdges(islands)) {
     const int s = elements_.rods[j.rod].slot(j.edge);
     const Frame f = iterate_.frameAt(s);
-    auto &[sum, count] = spins.try_emplace(j.group, Vec3::Zero(), 0).first->second;
-    sum +=
+    Mat3 axes;
+    axes << f.director, f.secondDirector(), f.tangent;
+    Vec3 stiffness;
+    for (int k = 0; k < 3; ++k) stiffness[k] = elements_.cells()[cell_stiffness + k][j.cell];
+    stiffness.array() += 1e-6 * stiffness.sum(); // about an axis that none bears
+    const Mat3 of_edge = axes * stiffness.asDiagonal() * axes.transpose();
+    const Vec3 spin =
         f.tangent.cross(increment.vector(0, s + 1) - increment.vector(0, s)) / f.length + f.tangent * increment[3][s];
-    ++count;
+    auto &[sum, moment] = of_group.try_emplace(j.group, Mat3::Zero(), Vec3::Zero()).first->second;
+    sum += of_edge;
+    moment += of_edge * spin;
   }
   for (const JoinedEdge &j : elements_.joinedEdges(islands)) {
-    const auto &[sum, count] = spins.at(j.group);
-    increment.setVector(0, j.frame, sum / count);
+    const auto &[sum, moment] = of_group.at(j.group);
+    increment.setVector(0, j.frame, sum.ldlt().solve(moment));
   }
 }
 

@@ -1,5 +1,7 @@
 #include "tendril/state/stage.hpp"
 
+#include <map>
+
 namespace tendril {
 
 Configuration::Configuration(int slots) : values_(planes, slots) {
@@ -75,6 +77,19 @@ State initialState(const Scene &scene, const Elements &elements) {
       const double expected = 2 * pi * rod.initial_turns * elements.cellLength()[elements.cell_slot[n]] / length;
       s.winding[n] = 2 * pi * std::round((expected - c[Configuration::twist][elements.cell_slot[n]]) / (2 * pi));
     }
+  }
+  // What is one point has one velocity: that of all momenta together, or none where it is held.
+  std::map<int, std::pair<Vec3, double>> momentum;
+  const auto joined = elements.joinedVertices({0, int(elements.rods.size())});
+  auto vertexOf = [&](const JoinedVertex &j) { return elements.rods[j.rod].first_vertex + j.vertex; };
+  for (const JoinedVertex &j : joined) {
+    auto &[sum, mass] = momentum.try_emplace(j.first_slot, Vec3::Zero(), 0.0).first->second;
+    sum += elements.mass()[j.slot] * s.velocity[vertexOf(j)];
+    mass += elements.mass()[j.slot];
+  }
+  for (const JoinedVertex &j : joined) {
+    const auto &[sum, mass] = momentum.at(j.first_slot);
+    s.velocity[vertexOf(j)] = mass > 0 ? Vec3(elements.freedom()[j.slot] * sum / mass) : Vec3(Vec3::Zero());
   }
   for (const Support &support : scene.supports)
     if (support.holdsPosition()) s.velocity[elements.rods[support.rod].first_vertex + support.vertex].setZero();

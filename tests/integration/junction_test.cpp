@@ -134,6 +134,45 @@ TEST(Junctions, FramesTurnManyTimes) {
   }
 }
 
+/// What is one point stays one, whatever velocities its rods are given; and the momentum of all is kept.
+TEST(Junctions, DifferentVelocitiesMeet) {
+  for (const char *method : {"euler", "midpoint", "generalized_alpha"}) {
+    Scene scene = cantilever(true, true);
+    scene.supports.clear();
+    scene.forces.clear();
+    scene.rods[0].initial_velocity = Vec3(0, 0, 1);
+    Simulation sim;
+    LoopSettings settings = dynamics(1e-3, 0.05);
+    settings.integrator.name = method;
+    runTo(sim, scene, settings);
+    EXPECT_EQ(sim.state.position[10], sim.state.position[11]) << method;
+    EXPECT_EQ(sim.state.velocity[10], sim.state.velocity[11]) << method;
+    double momentum = 0, mass = 0;
+    for (int v = 0; v < 22; ++v) {
+      momentum += sim.elements->mass()[sim.elements->vertex_slot[v]] * sim.state.velocity[v][2];
+      mass += sim.elements->mass()[sim.elements->vertex_slot[v]];
+    }
+    EXPECT_NEAR(momentum, 0.5 * mass, 1e-6) << method;
+  }
+}
+
+/// Strain rates of half cells are those of the cell that they make together, also where velocities give them.
+TEST(Junctions, DampingIsThatOfAWholeRod) {
+  for (const char *method : {"bdf2", "sdirk33", "sdirk23"}) {
+    EnergyBudget end[2];
+    for (const bool cut : {false, true}) {
+      Scene scene = cantilever(cut, true);
+      for (Rod &rod : scene.rods) rod.material.stiffness_damping_coefficient = 2e-2;
+      Simulation sim;
+      LoopSettings settings = dynamics(0.01, 0.2);
+      settings.integrator.name = method;
+      runTo(sim, scene, settings);
+      end[cut] = energyBudget(sim.scene, *sim.elements, sim.state, 1);
+    }
+    EXPECT_NEAR(end[1].bend, end[0].bend, 1e-3 * end[0].bend) << method;
+  }
+}
+
 /// Iterations hardly grow with the axial stiffness, though straight steps stretch edges.
 TEST(Junctions, StiffRodsTakeNoMoreIterations) {
   std::vector<int> iterations;

@@ -51,6 +51,7 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
         back[3][rod.slot(i)] = -moment * state.twist_rate[rod.first_edge + i];
       potential.dofs().copyBehindRing(rod, back);
     }
+    potential.turnFrames(potential.all(), back);
     Configuration earlier;
     bool possible = true;
     for (int r = 0; r < potential.all().end; ++r)
@@ -120,6 +121,7 @@ std::vector<double> strainsBehind(StepSolver &solver, const State &start, const 
       potential.dofs().copyBehindRing(rod, moved);
     }
     potential.remainingMotion(potential.all(), moved);
+    potential.turnFrames(potential.all(), moved);
     for (int r = 0; r < potential.all().end; ++r)
       if (!potential.tryMove(moved, 1, r, RetractionKind::additive, there)) return std::vector<double>();
     return strainsOf(potential.scene(), elements, there);
