@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 namespace tendril {
 namespace {
@@ -14,27 +15,33 @@ std::string labelOf(const Scene &scene, const Junction::Member &m) {
 
 Vec3 &placeOf(Scene &scene, const Junction::Member &m) { return scene.rods[m.rod].position[m.vertex]; }
 
-/// Points that vertices of several rods share, each with its vertices, by the first of them. Sorted along x, so that
-/// only neighbours have to be compared.
+/// Points that vertices of several rods share, each with its vertices, by the first of them. Sorted along a direction
+/// in which hardly any scene has many vertices side by side, so that only neighbours have to be compared.
 std::vector<std::vector<Junction::Member>> sharedPoints(const Scene &scene, const std::vector<int> &rods,
                                                         double within) {
   std::vector<Junction::Member> all;
   for (const int r : rods)
     for (int v = 0; v < scene.rods[r].vertices(); ++v) all.push_back({r, v, -1});
-  auto x = [&](const Junction::Member &m) -> const Vec3 & { return scene.rods[m.rod].position[m.vertex]; };
+  auto x = [&](int k) -> const Vec3 & { return scene.rods[all[k].rod].position[all[k].vertex]; };
+  const Vec3 direction = Vec3(1, 0.6180339887, 0.4142135624).normalized();
+  std::vector<double> along(all.size());
   std::vector<int> order(all.size());
-  for (int k = 0; k < int(order.size()); ++k) order[k] = k;
+  for (int k = 0; k < int(order.size()); ++k) {
+    order[k] = k;
+    along[k] = direction.dot(x(k));
+  }
   std::sort(order.begin(), order.end(),
-            [&](int a, int b) { return x(all[a])[0] != x(all[b])[0] ? x(all[a])[0] < x(all[b])[0] : a < b; });
+            [&](int a, int b) { return along[a] != along[b] ? along[a] < along[b] : a < b; });
   std::vector<int> first(all.size());
   for (int k = 0; k < int(first.size()); ++k) first[k] = k;
   auto rootOf = [&](int k) {
     while (first[k] != k) k = first[k];
     return k;
   };
+  const double rounding = 1e-12 * (all.empty() ? 0 : std::abs(along[order.front()]) + std::abs(along[order.back()]));
   for (std::size_t i = 0; i < order.size(); ++i)
-    for (std::size_t j = i + 1; j < order.size() && x(all[order[j]])[0] - x(all[order[i]])[0] <= within; ++j)
-      if ((x(all[order[j]]) - x(all[order[i]])).norm() <= within) {
+    for (std::size_t j = i + 1; j < order.size() && along[order[j]] - along[order[i]] <= within + rounding; ++j)
+      if ((x(order[j]) - x(order[i])).norm() <= within) {
         const int a = rootOf(order[i]), b = rootOf(order[j]);
         first[std::max(a, b)] = std::min(a, b);
       }
@@ -124,6 +131,7 @@ void readJunction(const YamlValue &value, SceneFile &out) {
     points = sharedPoints(scene, rods, within);
     if (points.empty()) value.fail("no two vertices of these rods are within " + shortText(within) + " m");
   }
+  std::size_t before = scene.junctions.size();
   for (std::size_t k = 0; k < points.size(); ++k) {
     Junction junction;
     junction.name = listed ? name : name + "#" + std::to_string(k);
@@ -143,14 +151,16 @@ void readJunction(const YamlValue &value, SceneFile &out) {
     complete(value, junction, within, out);
     scene.junctions.push_back(std::move(junction));
   }
-  for (const Junction &junction : scene.junctions)
-    for (const Junction::Member &m : junction.members) {
-      try {
-        checkRod(scene.rods[m.rod]);
-      } catch (const SceneError &e) {
-        value.fail(e.what());
-      }
+  std::set<int> moved;
+  for (; before < scene.junctions.size(); ++before)
+    for (const Junction::Member &m : scene.junctions[before].members) moved.insert(m.rod);
+  for (const int r : moved) {
+    try {
+      checkRod(scene.rods[r]);
+    } catch (const SceneError &e) {
+      value.fail(e.what());
     }
+  }
   map.finish();
 }
 
