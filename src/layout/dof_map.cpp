@@ -32,6 +32,14 @@ PetscErrorCode createLocalVector(DM dm, Vec *v) {
   PetscFunctionReturn(0);
 }
 
+/// Vertices whose positions are no unknowns: those that are held, and copies in junctions.
+std::vector<bool> withoutUnknowns(std::vector<bool> held, const std::vector<RodRange> &rods,
+                                  const std::vector<JoinedVertex> &joined) {
+  for (const JoinedVertex &j : joined)
+    if (j.isCopy()) held[rods[j.rod].first_vertex + j.vertex] = true;
+  return held;
+}
+
 } // namespace
 
 /// Section over the points v0, e0, v1, e1, ... of every rod, with the frames of junctions that it has behind; the last
@@ -53,9 +61,7 @@ PetscErrorCode DofMap::createSection(PetscSection *section) const {
   }
   PetscCall(PetscSectionSetChart(*section, 0, points));
   PetscInt point = 0;
-  std::vector<bool> fixed = held_;
-  for (const JoinedVertex &j : joined_vertices_.items)
-    if (j.isCopy()) fixed[rods_[j.rod].first_vertex + j.vertex] = true;
+  const std::vector<bool> fixed = withoutUnknowns(held_, rods_, joined_vertices_.items);
   for (int r = 0; r < int(rods_.size()); ++r) {
     for (int i = 0; i < rods_[r].vertices; ++i) {
       const PetscInt vertex = point++;
@@ -133,9 +139,7 @@ PetscErrorCode DofMap::setUp(const Scene &scene) {
 
   unknown_.assign(std::size_t(slots_) * slot_size, -1);
   PetscInt point = 0, next = 0;
-  std::vector<bool> fixed = held_;
-  for (const JoinedVertex &j : joined_vertices_.items)
-    if (j.isCopy()) fixed[rods_[j.rod].first_vertex + j.vertex] = true;
+  const std::vector<bool> fixed = withoutUnknowns(held_, rods_, joined_vertices_.items);
   for (int r = 0; r < int(rods_.size()); ++r) {
     const RodRange &rod = rods_[r];
     unknown_begin_.push_back(next);
