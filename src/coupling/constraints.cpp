@@ -1,5 +1,5 @@
-/// Constraints by springs and dampers: a vertex to a point, the frame of an edge to a frame, both fixed in the world or
-/// moving there.
+/// Constraints by springs and dampers: a vertex to a point or the frame of an edge to a frame, both fixed in the world
+/// or moving there; and a vertex to another one.
 #include "tendril/coupling/couplings.hpp"
 #include "tendril/energy/constraint.hpp"
 
@@ -76,6 +76,13 @@ private:
   Vec3 movedSinceRest(const Configuration &c) const { return length_ * (strainOf(c) - rest_).col(0); }
 };
 
+/// A pin whose point is another vertex.
+class PinToVertex : public Pin {
+public:
+  static constexpr SiteKind site = SiteKind::tie;
+  using Pin::Pin;
+};
+
 /// A rotation vector jumps at half a turn: trials that lead across it from the iterate are impossible.
 class Rotation : public Spring {
 public:
@@ -124,10 +131,12 @@ private:
 };
 
 template <class Stencil>
-std::unique_ptr<Term> makeConstraints(const Scene &scene, const Elements &elements, Constraint::Kind kind) {
+std::unique_ptr<Term> makeConstraints(const Scene &scene, const Elements &elements, Constraint::Kind kind,
+                                      bool ties = false) {
   std::vector<Stencil> stencils;
   for (std::size_t k = 0; k < scene.constraints.size(); ++k)
-    if (scene.constraints[k].kind == kind) stencils.emplace_back(scene, elements, int(k));
+    if (scene.constraints[k].kind == kind && scene.constraints[k].isTie() == ties)
+      stencils.emplace_back(scene, elements, int(k));
   if (stencils.empty()) return nullptr;
   return std::make_unique<StencilTerm<Stencil, &EnergyBudget::constraint>>(std::move(stencils), elements);
 }
@@ -136,6 +145,9 @@ std::unique_ptr<Term> makeConstraints(const Scene &scene, const Elements &elemen
 
 std::unique_ptr<Term> makePins(const Scene &scene, const Elements &elements) {
   return makeConstraints<Pin>(scene, elements, Constraint::Kind::pin);
+}
+std::unique_ptr<Term> makeTies(const Scene &scene, const Elements &elements) {
+  return makeConstraints<PinToVertex>(scene, elements, Constraint::Kind::pin, true);
 }
 std::unique_ptr<Term> makeRotations(const Scene &scene, const Elements &elements) {
   return makeConstraints<Rotation>(scene, elements, Constraint::Kind::rotation);

@@ -92,9 +92,12 @@ ConstraintReading readConstraint(const Scene &scene, const Elements &elements, i
   const Motion still, &motion = constraint.damps_motion ? constraint.motion : still;
   ConstraintReading out;
   if (constraint.isPin()) {
+    const Vec3 target_velocity =
+        constraint.isTie() ? state.velocity[elements.rods[constraint.to_rod].first_vertex + constraint.to_vertex]
+                           : motion.velocityAt(state.time);
     out.distance = g;
     out.force = -distanceDerivatives(constraint, g).gradient -
-                damping * (state.velocity[rod.first_vertex + constraint.at] - motion.velocityAt(state.time));
+                damping * (state.velocity[rod.first_vertex + constraint.at] - target_velocity);
     return out;
   }
   const int e = rod.first_edge + constraint.at;

@@ -14,14 +14,56 @@ double stiffestTurning(const Material &m) {
   return std::max({m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness});
 }
 
-int closestVertex(const Rod &rod, const Vec3 &point) {
-  auto away = [&](const Vec3 &x) { return (x - point).squaredNorm(); };
-  return int(std::min_element(rod.position.begin(), rod.position.end(),
-                              [&](const Vec3 &a, const Vec3 &b) { return away(a) < away(b); }) -
-             rod.position.begin());
+/// \param but a vertex that is not meant, or -1
+int closestVertex(const Rod &rod, const Vec3 &point, int but = -1) {
+  int closest = -1;
+  for (int v = 0; v < rod.vertices(); ++v)
+    if (v != but &&
+        (closest < 0 || (rod.position[v] - point).squaredNorm() < (rod.position[closest] - point).squaredNorm()))
+      closest = v;
+  return closest;
 }
 
-void readPin(YamlMap &map, const Rod &rod, const std::vector<Support> &supports, Constraint &c) {
+std::string labelOf(const Scene &scene, int rod, int vertex) {
+  return "vertex " + std::to_string(vertex) + " of rod '" + scene.rods[rod].name + "'";
+}
+
+bool isHeld(const Scene &scene, int rod, int vertex) {
+  return std::any_of(scene.supports.begin(), scene.supports.end(),
+                     [&](const Support &s) { return s.rod == rod && s.vertex == vertex && s.holdsPosition(); });
+}
+
+/// What a constraint between two vertices does not have.
+void refuseForTie(YamlMap &map, const std::string &type) {
+  if (type != "pin")
+    map.at("constraints[].to").fail("a rotation turns an edge to a frame of the world; a vertex is for 'type: pin'");
+  for (const AnyKey key : {AnyKey("constraints[].point"), AnyKey("constraints[].motion"),
+                           AnyKey("constraints[].closest"), AnyKey("constraints[].update_old_target")})
+    if (map.has(key)) map.at(key).fail("'" + std::string(key->name()) + "' is for a constraint 'to: world'");
+}
+
+/// The other end of a tie.
+void readOther(YamlMap &map, const SceneFile &file, Constraint &c) {
+  const Scene &scene = file.scene;
+  const YamlValue value = map.at("constraints[].to");
+  YamlMap to(value, "constraints[].to");
+  const std::vector<int> rods = readTargets(to, "constraints[].to.rod", file.names);
+  if (rods.size() != 1) value.fail("the other end is on one rod; name it");
+  c.to_rod = rods.front();
+  const Rod &rod = scene.rods[c.to_rod];
+  const bool closest = to.flag("constraints[].to.closest");
+  if (closest == to.has("constraints[].to.vertex"))
+    value.fail(std::string("the other end needs a 'vertex', or 'closest: true'") + (closest ? ", not both" : ""));
+  c.to_vertex = closest ? closestVertex(rod, scene.rods[c.rod].position[c.at], c.to_rod == c.rod ? c.at : -1)
+                        : readIndex(to, "constraints[].to.vertex", rod.vertices(), rod.name);
+  to.finish();
+  const std::string own = labelOf(scene, c.rod, c.at), other = labelOf(scene, c.to_rod, c.to_vertex);
+  if (c.rod == c.to_rod && c.at == c.to_vertex) value.fail("both ends are " + own);
+  if (isHeld(scene, c.rod, c.at) && isHeld(scene, c.to_rod, c.to_vertex))
+    value.fail("supports hold " + own + " and " + other + ", which a pin cannot move; take one of them away");
+}
+
+void readPin(YamlMap &map, const Rod &rod, const SceneFile &file, Constraint &c) {
   for (const AnyKey key : {AnyKey("constraints[].edge"), AnyKey("constraints[].tangent"),
                            AnyKey("constraints[].director"), AnyKey("constraints[].measure")})
     if (map.has(key)) map.at(key).fail("'" + std::string(key->name()) + "' is for 'type: rotation'");
@@ -35,10 +77,10 @@ void readPin(YamlMap &map, const Rod &rod, const std::vector<Support> &supports,
     map.value().fail("a pin needs a 'vertex', or a 'point' with 'closest: true'");
   c.at = closest ? closestVertex(rod, c.point) : readIndex(map, "constraints[].vertex", rod.vertices(), rod.name);
   if (!c.point_given) c.point = rod.position[c.at];
-  for (const Support &s : supports)
-    if (s.rod == c.rod && s.vertex == c.at && s.holdsPosition())
-      map.value().fail("vertex " + std::to_string(c.at) + " of rod '" + rod.name +
-                       "' is held by a support, which a pin cannot move; take one of them away");
+  if (map.at("constraints[].to").isMap()) return readOther(map, file, c);
+  if (isHeld(file.scene, c.rod, c.at))
+    map.value().fail(labelOf(file.scene, c.rod, c.at) +
+                     " is held by a support, which a pin cannot move; take one of them away");
 }
 
 void readRotation(YamlMap &map, const Rod &rod, Constraint &c) {
@@ -83,7 +125,8 @@ void readConstraint(const YamlValue &value, SceneFile &out) {
   Scene &scene = out.scene;
   YamlMap map(value, "constraints");
   const std::string type = map.word("constraints[].type");
-  map.word("constraints[].to");
+  const YamlValue to = map.at("constraints[].to");
+  to.isMap() ? refuseForTie(map, type) : (void)map.word("constraints[].to");
   const std::vector<int> rods = readTargets(map, "constraints[].rod", out.names);
   const std::string name = map.has("constraints[].name") ? readName(map.at("constraints[].name"))
                                                          : "constraint" + std::to_string(out.constraint_blocks);
@@ -100,8 +143,10 @@ void readConstraint(const YamlValue &value, SceneFile &out) {
     c.rod = r;
     if (!map.has("constraints[].stiffness")) {
       map.refuseUnknown();
-      value.fail("'stiffness' is missing; to hold a " + std::string(c.isPin() ? "vertex" : "frame") +
-                 " exactly, write a support of 'type: " + (c.isPin() ? "pin" : "clamp") + "'");
+      value.fail("'stiffness' is missing; to " +
+                 (to.isMap() ? "make two vertices one point exactly, write a junction of 'type: ball'"
+                             : "hold a " + std::string(c.isPin() ? "vertex" : "frame") +
+                                   " exactly, write a support of 'type: " + (c.isPin() ? "pin" : "clamp") + "'"));
     }
     c.stiffness = map.number("constraints[].stiffness");
     c.damping = map.number("constraints[].damping");
@@ -119,13 +164,17 @@ void readConstraint(const YamlValue &value, SceneFile &out) {
       else
         refuseTravel(motion, c.motion, "a rotation moves nothing; take the displacement away, or add a pin that moves");
     }
-    c.isPin() ? readPin(map, rod, scene.supports, c) : readRotation(map, rod, c);
+    c.isPin() ? readPin(map, rod, out, c) : readRotation(map, rod, c);
     const double length = rod.length();
     const double own = c.isPin() ? rod.material.axial_stiffness / length : stiffestTurning(rod.material) / length;
     if (c.stiffness > 1e6 * own && !told) {
       out.notes.push_back("warning: " + map.at("constraints[].stiffness").place() + ": 'stiffness' is " +
                           shortText(c.stiffness / own) + " times that of rod '" + rod.name +
-                          "', which costs digits; a support of 'type: " + (c.isPin() ? "pin" : "clamp") + "' is exact");
+                          "', which costs digits; a " +
+                          (c.isTie()   ? "junction of 'type: ball"
+                           : c.isPin() ? "support of 'type: pin"
+                                       : "support of 'type: clamp") +
+                          "' is exact");
       told = true;
     }
     scene.constraints.push_back(std::move(c));

@@ -21,11 +21,13 @@ void requireHeld(const Scene &scene) {
   };
   for (const Junction &j : scene.junctions)
     for (const Junction::Member &m : j.members) first[rootOf(m.rod)] = rootOf(j.members.front().rod);
+  for (const Constraint &c : scene.constraints)
+    if (c.isTie() && c.stiffness > 0) first[rootOf(c.rod)] = rootOf(c.to_rod);
   std::vector<char> held(scene.rods.size(), false);
   for (const Support &s : scene.supports)
     if (s.holdsPosition()) held[rootOf(s.rod)] = true;
   for (const Constraint &c : scene.constraints)
-    if (c.isPin() && c.stiffness > 0) held[rootOf(c.rod)] = true;
+    if (c.isPin() && !c.isTie() && c.stiffness > 0) held[rootOf(c.rod)] = true;
   for (int r = 0; r < int(scene.rods.size()); ++r)
     if (scene.touches(r)) held[rootOf(r)] = true; // what obstacles hold shows
   for (int r = 0; r < int(scene.rods.size()); ++r)
@@ -139,10 +141,10 @@ PetscErrorCode prepare(Prepared &prepared, Options &o) {
           "' turns an edge, whose middle moves when edges change: errors do not fall with the square of their "
           "length; take a clamp, or compare runs with -rod_edges");
   if (!file.scene.colliders.empty()) refuseWithObstacles(o);
-  if (o.accuracy && !file.scene.junctions.empty())
+  if (o.accuracy && file.scene.isJoined())
     throw SceneError(
-        "option -accuracy: chooses the edges of each rod by itself, and is not for scenes with 'junctions' "
-        "yet; compare runs with -rod_edges, or take -error_estimate");
+        "option -accuracy: chooses the edges of each rod by itself, and is not for rods that 'junctions' or "
+        "'constraints' join yet; compare runs with -rod_edges, or take -error_estimate");
   if (o.accuracy && o.accuracy->of == Quantity::tip)
     for (const Rod &rod : file.scene.rods)
       if (rod.closed)

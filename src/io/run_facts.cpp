@@ -46,8 +46,9 @@ std::string textOf(const Support &support) {
 
 std::string textOf(const Constraint &c) {
   std::string text =
-      c.isPin() ? "pin to " + textOf(c.point)
-                : "rotation to tangent " + textOf(c.frame.tangent) + " and director " + textOf(c.frame.director);
+      c.isTie()   ? "pin to vertex " + std::to_string(c.to_vertex) + " of rod " + std::to_string(c.to_rod)
+      : c.isPin() ? "pin to " + textOf(c.point)
+                  : "rotation to tangent " + textOf(c.frame.tangent) + " and director " + textOf(c.frame.director);
   text += ", stiffness " + textOf(c.stiffness) + ", damping " + textOf(c.damping);
   if (c.damping != 0 && !c.damps_motion) text += " of the rod's motion alone";
   if (c.saturation > 0) text += ", saturation " + textOf(c.saturation);

@@ -121,7 +121,7 @@ void TrajectoryWriter::writeSupports() {
 
 void TrajectoryWriter::writeConstraints() {
   if (scene_.constraints.empty()) return;
-  std::vector<int> rods, places;
+  std::vector<int> rods, places, others;
   std::vector<std::string> names, types;
   for (const Constraint &c : scene_.constraints) {
     const RodRange &rod = elements_.rods[c.rod];
@@ -129,12 +129,14 @@ void TrajectoryWriter::writeConstraints() {
     types.push_back(nameOf(c.kind));
     rods.push_back(c.rod);
     places.push_back((c.isPin() ? rod.first_vertex : rod.first_edge) + c.at);
+    others.push_back(c.isTie() ? elements_.rods[c.to_rod].first_vertex + c.to_vertex : -1);
   }
   file_.createGroup("constraints");
   file_.write("constraints/name", names);
   file_.write("constraints/type", types);
   file_.write("constraints/rod", {rods.size()}, rods.data());
   file_.write("constraints/place", {places.size()}, places.data());
+  file_.write("constraints/to_vertex", {others.size()}, others.data());
 }
 
 /// Radii, then half lengths.

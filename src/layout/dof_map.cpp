@@ -3,7 +3,6 @@
 #include <petscdmshell.h>
 
 #include <algorithm>
-#include <unordered_map>
 
 namespace tendril {
 namespace {
@@ -104,8 +103,15 @@ PetscErrorCode DofMap::setUp(const Scene &scene) {
   for (const Support &s : scene.supports)
     if (scene.rods[s.rod].edgeBefore(s.vertex) >= 0 && scene.rods[s.rod].edgeAfter(s.vertex) >= 0)
       along[s.rod] += 3; // a frame and two cells
-  for (const Constraint &c : scene.constraints) along[c.rod] += c.slots();
-  const std::vector<int> before_junctions = along;
+  for (const Constraint &c : scene.constraints)
+    if (!c.isTie()) along[c.rod] += c.slots();
+  const std::vector<int> before_joins = along;
+  bool joins = !scene.junctions.empty();
+  for (const Constraint &c : scene.constraints)
+    if (c.isTie()) {
+      ++along[c.rod];
+      joins = true;
+    }
   for (const Junction &j : scene.junctions)
     for (const Junction::Member &m : j.members) along[m.rod] += 4; // frames and half cells of two edges
   slots_ = lanes;                                                  // room for the frame before the first rod
@@ -125,7 +131,7 @@ PetscErrorCode DofMap::setUp(const Scene &scene) {
     if (s.holdsPosition()) held_[rods_[s.rod].first_vertex + s.vertex] = true;
   unknown_end_.clear();
   for (const RodRange &rod : rods_) unknown_end_.push_back(rod.vertexEnd());
-  if (!scene.junctions.empty()) join(scene, before_junctions);
+  if (joins) join(scene, before_joins);
 
   OwnedSection section;
   PetscCall(createSection(section.out()));
@@ -170,12 +176,21 @@ PetscErrorCode DofMap::setUp(const Scene &scene) {
   PetscFunctionReturn(0);
 }
 
-/// What junctions make of vertices and edges, and the islands. A vertex that a support holds holds the others with it.
+/// Joins the islands of two rods to one, with all between them.
+void DofMap::makeIsland(RodSet a, RodSet b) {
+  const RodSet island{std::min(a.begin, b.begin), std::max(a.end, b.end)};
+  for (int r = island.begin; r < island.end; ++r) islands_[r] = island;
+}
+
+/// What junctions and ties make of vertices and edges, and the islands. A vertex that a support holds holds the others
+/// of its junction with it.
 void DofMap::join(const Scene &scene, std::vector<int> free_slots) {
   joined_vertices_ = {};
   joined_edges_ = {};
+  ties_ = {};
   groups_ = 0;
   islands_.clear();
+  joined_.assign(rods_.size(), false);
   for (int r = 0; r < int(rods_.size()); ++r) islands_.push_back({r, r + 1});
   for (int k = 0; k < int(scene.junctions.size()); ++k) {
     const Junction &junction = scene.junctions[k];
@@ -184,12 +199,12 @@ void DofMap::join(const Scene &scene, std::vector<int> free_slots) {
     const bool held = holder != junction.members.end();
     const Junction::Member &first = held ? *holder : junction.members.front(); // supports that move, move it
     std::vector<int> first_frame(junction.groups, -1);
-    RodSet island = islands_[first.rod];
     for (const Junction::Member &m : junction.members) {
       const RodRange &range = rods_[m.rod];
       const Rod &rod = scene.rods[m.rod];
       joined_vertices_.items.push_back({m.rod, m.vertex, range.slot(m.vertex), rods_[first.rod].slot(first.vertex), k});
-      island = {std::min(island.begin, islands_[m.rod].begin), std::max(island.end, islands_[m.rod].end)};
+      makeIsland(islands_[first.rod], islands_[m.rod]);
+      joined_[m.rod] = true;
       if (m.group < 0 || !range.twist) continue;
       for (const bool ends : {true, false}) {
         const int edge = ends ? rod.edgeBefore(m.vertex) : rod.edgeAfter(m.vertex);
@@ -206,10 +221,19 @@ void DofMap::join(const Scene &scene, std::vector<int> free_slots) {
     for (const Junction::Member &m : junction.members)
       if (held) held_[rods_[m.rod].first_vertex + m.vertex] = true;
     groups_ += junction.groups;
-    for (int r = island.begin; r < island.end; ++r) islands_[r] = island;
+  }
+  for (int k = 0; k < int(scene.constraints.size()); ++k) {
+    const Constraint &c = scene.constraints[k];
+    if (!c.isTie()) continue;
+    const RodRange &own = rods_[c.rod], &to = rods_[c.to_rod];
+    ties_.items.push_back({c.rod, own.slot(c.at), own.looseSlot() + free_slots[c.rod]++, to.first_vertex + c.to_vertex,
+                           to.slot(c.to_vertex), k});
+    makeIsland(islands_[c.rod], islands_[c.to_rod]);
+    joined_[c.rod] = joined_[c.to_rod] = true;
   }
   joined_vertices_.sort(rods_.size());
   joined_edges_.sort(rods_.size());
+  ties_.sort(rods_.size());
 }
 
 namespace {
@@ -222,6 +246,13 @@ struct Part {
 
 } // namespace
 
+std::unordered_map<int, int> DofMap::firstSlots(RodSet rods) const {
+  std::unordered_map<int, int> first;
+  for (const JoinedVertex &j : joinedVertices(rods)) first[j.slot] = j.first_slot;
+  for (const JoinedEdge &j : joinedEdges(rods)) first[j.frame] = j.first_frame;
+  return first;
+}
+
 PetscErrorCode DofMap::createMatrix(RodSet rods, bool joins, Mat *matrix, Pattern *pattern) const {
   PetscFunctionBeginUser;
   std::vector<PetscInt> row, column;
@@ -230,9 +261,7 @@ PetscErrorCode DofMap::createMatrix(RodSet rods, bool joins, Mat *matrix, Patter
   EdgeBlocks blocks(0, joins); // for its window
   blocks.setOrigin(rods_[rods.begin].first_slot);
   const PetscInt first = firstUnknown(rods);
-  std::unordered_map<int, int> copies; // slot of what they stand for
-  for (const JoinedVertex &j : joinedVertices(rods)) copies[j.slot] = j.first_slot;
-  for (const JoinedEdge &j : joinedEdges(rods)) copies[j.frame] = j.first_frame;
+  const std::unordered_map<int, int> copies = firstSlots(rods);
   auto shared = [&](int slot, int a) {
     const auto found = copies.find(slot);
     return unknown(found == copies.end() ? slot : found->second, a);
@@ -283,6 +312,12 @@ PetscErrorCode DofMap::createMatrix(RodSet rods, bool joins, Mat *matrix, Patter
           couple(spin(a), edge(j.edge, c), EdgeBlocks::across(a, c), j.cell - rod.first_slot, false);
       }
     }
+    for (const Tie &t : ties({r, r + 1})) {
+      auto difference = [&](int a) { return std::vector<Part>{{shared(t.slot, a), false}, {shared(t.of, a), true}}; };
+      for (int a = 0; a < 3; ++a)
+        for (int c = a; c < 3; ++c)
+          couple(difference(a), difference(c), EdgeBlocks::vertex(a, c), t.copy - rod.first_slot, a == c);
+    }
   }
   const bool whole = rods.begin == 0 && rods.end == int(rods_.size());
   PetscCall(MatCreate(whole ? PETSC_COMM_WORLD : PETSC_COMM_SELF, matrix));
@@ -329,6 +364,7 @@ void DofMap::copyJoined(RodSet islands, Planes &increment) const {
   }
   for (const JoinedEdge &j : joinedEdges(islands))
     if (!j.isFirst()) increment.setVector(0, j.frame, increment.vector(0, j.first_frame));
+  for (const Tie &t : ties(islands)) increment.setVector(0, t.copy, increment.vector(0, t.of));
 }
 
 void DofMap::foldJoined(RodSet islands, Planes &sums) const {
@@ -336,6 +372,7 @@ void DofMap::foldJoined(RodSet islands, Planes &sums) const {
     sums.setVector(0, to, sums.vector(0, to) + sums.vector(0, from));
     sums.setVector(0, from, Vec3::Zero());
   };
+  for (const Tie &t : ties(islands)) move(t.copy, t.of);
   for (const JoinedVertex &j : joinedVertices(islands))
     if (j.isCopy()) move(j.slot, j.first_slot);
   for (const JoinedEdge &j : joinedEdges(islands))

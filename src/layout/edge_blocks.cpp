@@ -19,8 +19,7 @@ void EdgeBlocks::fold(const RodRange &rod) {
   }
 }
 
-void EdgeBlocks::multiply(const RodRange &rod, std::span<const JoinedEdge> joined_edges, const Planes &x,
-                          Planes &y) const {
+void EdgeBlocks::multiply(const RodRange &rod, const Joins &of, const Planes &x, Planes &y) const {
   using Four = std::array<double, edge_size>;
   auto edge = [&](int i) {
     Four d{0, 0, 0, x[3][rod.slot(i)]};
@@ -63,7 +62,7 @@ void EdgeBlocks::multiply(const RodRange &rod, std::span<const JoinedEdge> joine
     if (i > 0) add(i - 1, force_before);
     before = here;
   }
-  for (const JoinedEdge &j : joined_edges) {
+  for (const JoinedEdge &j : of.edges) {
     const Four here = edge(j.edge);
     Four force{};
     for (int r = 0; r < 3; ++r) {
@@ -77,9 +76,18 @@ void EdgeBlocks::multiply(const RodRange &rod, std::span<const JoinedEdge> joine
     }
     add(j.edge, force);
   }
+  for (const Tie &t : of.ties) {
+    const Vec3 moved = x.vector(0, t.slot) - x.vector(0, t.copy);
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) {
+        const double force = value(vertex(std::min(r, c), std::max(r, c)), t.copy - rod.first_slot) * moved[c];
+        y[r][t.slot] += force;
+        y[r][t.copy] -= force;
+      }
+  }
 }
 
-double EdgeBlocks::magnitude(const RodRange &rod, std::span<const JoinedEdge> joined_edges, const Planes &x) const {
+double EdgeBlocks::magnitude(const RodRange &rod, const Joins &of, const Planes &x) const {
   double sum = 0;
   std::array<double, edge_size> before{};
   for (int i = 0; i < rod.vertices; ++i)
@@ -97,7 +105,7 @@ double EdgeBlocks::magnitude(const RodRange &rod, std::span<const JoinedEdge> jo
       }
     before = here;
   }
-  for (const JoinedEdge &j : joined_edges)
+  for (const JoinedEdge &j : of.edges)
     for (int r = 0; r < 3; ++r) {
       for (int c = r; c < 3; ++c)
         sum += std::pow(
@@ -107,6 +115,12 @@ double EdgeBlocks::magnitude(const RodRange &rod, std::span<const JoinedEdge> jo
         sum += std::pow(2 * entry(rod, across(r, c))[j.cell - rod.first_slot] * x[r][j.frame] * d, 2);
       }
     }
+  for (const Tie &t : of.ties) {
+    const Vec3 moved = x.vector(0, t.slot) - x.vector(0, t.copy);
+    for (int r = 0; r < 3; ++r)
+      for (int c = r; c < 3; ++c)
+        sum += std::pow((r == c ? 1 : 2) * entry(rod, vertex(r, c))[t.copy - rod.first_slot] * moved[r] * moved[c], 2);
+  }
   return std::sqrt(sum);
 }
 

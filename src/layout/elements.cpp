@@ -170,7 +170,7 @@ private:
 Elements::Elements(const Scene &scene, const DofMap &dofs)
     : rods(dofs.rods()), slots(dofs.slots()), loose(rods.size()), end_couples(rods.size()),
       support_slot(scene.supports.size(), -1), rod_cells{0}, groups(dofs.groups()), joined_edges_(dofs.joinedEdges()),
-      joined_vertices_(dofs.joinedVertices()) {
+      joined_vertices_(dofs.joinedVertices()), ties_(dofs.ties()) {
   std::vector<int> free_slots; ///< per rod, behind those of its supports
   constants_ = Planes(7, slots);
   joined_frame_.resize(joined_edges_.items.size());
@@ -221,9 +221,15 @@ void Elements::placeConstraints(const Scene &scene, std::vector<int> free_slots)
   pins_.resize(rods.size());
   for (std::size_t k = 0; k < scene.constraints.size(); ++k) {
     const Constraint &c = scene.constraints[k];
+    constraints_[c.rod].push_back(int(k));
+    if (c.isTie()) {
+      const auto tied = ties({c.rod, c.rod + 1});
+      constraint_slot.push_back(
+          std::find_if(tied.begin(), tied.end(), [&](const Tie &t) { return t.constraint == int(k); })->copy);
+      continue;
+    }
     constraint_slot.push_back(free_slots[c.rod]);
     free_slots[c.rod] += c.slots();
-    constraints_[c.rod].push_back(int(k));
     if (!c.isPin()) continue;
     const int slot = rods[c.rod].slot(c.at);
     Pins &pins = pins_[c.rod];

@@ -81,8 +81,7 @@ std::vector<int> firstAlike(const Scene &scene, const std::vector<Drawing> &draw
   };
   std::vector<int> first, kinds;
   for (int s = 0; s < int(rods); ++s) {
-    const auto found = scene.rotation.angular_velocity.isZero(0) && scene.colliders.empty() &&
-                               scene.junctions.empty()
+    const auto found = scene.rotation.angular_velocity.isZero(0) && scene.colliders.empty() && !scene.isJoined()
                            ? std::find_if(kinds.begin(), kinds.end(), [&](int r) { return alike(r, s); })
                            : kinds.end();
     first.push_back(found == kinds.end() ? s : *found);
@@ -103,6 +102,8 @@ Scene withRods(const Scene &scene, const std::vector<int> &rods) {
   }
   keep(scene.supports, place, out.supports);
   keep(scene.constraints, place, out.constraints);
+  for (Constraint &c : out.constraints)
+    if (c.isTie()) c.to_rod = place[c.to_rod];
   if (rods.size() == scene.rods.size()) out.junctions = scene.junctions; // of joined rods none is left out
   keep(scene.forces, place, out.forces);
   keep(scene.moments, place, out.moments);

@@ -146,8 +146,8 @@ int movedEdge(const Rod &written, const Drawing &drawing, int edge, int edges) {
   return found;
 }
 
-/// Vertices that supports, constraints, junctions and loads name, without the ends of a rod and the first of a closed one: those
-/// are vertices of any number of edges.
+/// Vertices that supports, constraints, junctions and loads name, without the ends of a rod and the first of a closed
+/// one: those are vertices of any number of edges.
 std::vector<int> namedVertices(const Scene &scene, int r) {
   std::vector<int> named;
   auto add = [&](int rod, int vertex) {
@@ -156,6 +156,8 @@ std::vector<int> namedVertices(const Scene &scene, int r) {
   for (const Support &s : scene.supports) add(s.rod, s.vertex);
   for (const Constraint &c : scene.constraints)
     if (c.isPin()) add(c.rod, c.at);
+  for (const Constraint &c : scene.constraints)
+    if (c.isTie()) add(c.to_rod, c.to_vertex);
   for (const Junction &j : scene.junctions)
     for (const Junction::Member &m : j.members) add(m.rod, m.vertex);
   for (const NodalForce &f : scene.forces) add(f.rod, f.vertex);
@@ -298,6 +300,8 @@ Scene remesh(const Scene &written, const std::vector<Drawing> &drawings, const s
   }
   for (const Constraint &constraint : written.constraints) {
     Constraint &c = scene.constraints.emplace_back(constraint);
+    if (c.isTie() && isRemeshed(written.rods[c.to_rod], drawings[c.to_rod], edges[c.to_rod]))
+      c.to_vertex = movedVertex(written.rods[c.to_rod], drawings[c.to_rod], c.to_vertex, edges[c.to_rod]);
     const Rod &rod = scene.rods[c.rod], &before = written.rods[c.rod];
     if (!isRemeshed(before, drawings[c.rod], edges[c.rod])) continue;
     c.at = c.isPin() ? movedVertex(before, drawings[c.rod], c.at, edges[c.rod])

@@ -164,6 +164,11 @@ DimensionlessGroups dimensionlessGroups(const Rod &rod, const Vec3 &gravity) {
   return g;
 }
 
+bool Scene::isJoined() const {
+  return !junctions.empty() ||
+         std::any_of(constraints.begin(), constraints.end(), [](const Constraint &c) { return c.isTie(); });
+}
+
 const char *nameOf(Constraint::Kind kind) { return kind == Constraint::Kind::pin ? "pin" : "rotation"; }
 
 const char *nameOf(Support::Kind kind) {

@@ -40,7 +40,8 @@ BandedFactor::BandedFactor(const DofMap &dofs, RodSet set, BandedWorkspace &work
     rows = std::max(rows, std::size_t(slot_size) * rods[r].vertices);
   }
   std::iota(order_.begin(), order_.end(), set.begin);
-  auto shape = [&](int r) { return std::tuple(rods[r].vertices, rods[r].closed, rods[r].twist); };
+  // Slots, too: planes of blocks are so far apart.
+  auto shape = [&](int r) { return std::tuple(rods[r].vertices, rods[r].slots, rods[r].closed, rods[r].twist); };
   std::stable_sort(order_.begin(), order_.end(), [&](int a, int b) {
     if (shape(a) != shape(b)) return shape(a) < shape(b);
     return held_[a - set.begin] < held_[b - set.begin];
@@ -55,8 +56,8 @@ BandedFactor::BandedFactor(const DofMap &dofs, RodSet set, BandedWorkspace &work
 
 bool BandedFactor::sameShape(int a, int b) const {
   const RodRange &one = dofs_.rods()[a], &other = dofs_.rods()[b];
-  return one.vertices == other.vertices && one.closed == other.closed && one.twist == other.twist &&
-         held_[a - rods_.begin] == held_[b - rods_.begin];
+  return one.vertices == other.vertices && one.slots == other.slots && one.closed == other.closed &&
+         one.twist == other.twist && held_[a - rods_.begin] == held_[b - rods_.begin];
 }
 
 /// Groups of the active rods of each shape: whole packs; of the rest, a pack when that is cheaper than one after the
@@ -236,9 +237,8 @@ PetscErrorCode multiply(Mat a, Vec x, Vec y) {
   PetscCall(dofs.scatter(x, system->rods, in));
   for (int r = system->rods.begin; r < system->rods.end; ++r) {
     const RodRange &rod = dofs.rods()[r];
-    const std::span<const JoinedEdge> joined = dofs.joinedEdges({r, r + 1});
-    system->blocks->multiply(rod, joined, in, out);
-    addMetric(*system->metric, system->edge_metric, rod, joined, (*system->shift)[r], in, out);
+    system->blocks->multiply(rod, dofs.joins(r), in, out);
+    addMetric(*system->metric, system->edge_metric, rod, dofs.joinedEdges({r, r + 1}), (*system->shift)[r], in, out);
     dofs.fold(rod, out);
   }
   dofs.foldJoined(system->rods, out);

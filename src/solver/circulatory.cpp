@@ -97,8 +97,8 @@ bool Circulatory::correct(Planes &x) const {
         for (int a = 0; a < slot_size; ++a)
           for (int s = rod.first_slot; s < rod.vertexEnd() + (rod.closed ? 2 : 0); ++s)
             x[a][s] -= c[k] * solved_[k][a][s];
-        for (const JoinedEdge &j : potential_.dofs().joinedEdges({r, r + 1}))
-          x.setVector(0, j.frame, x.vector(0, j.frame) - c[k] * solved_[k].vector(0, j.frame));
+        potential_.dofs().forBeside({r, r + 1},
+                                    [&](int s) { x.setVector(0, s, x.vector(0, s) - c[k] * solved_[k].vector(0, s)); });
       }
     first += n;
   }

@@ -97,8 +97,8 @@ void NewtonSolver::multiplyHessian(RodSet island, const Planes &x, Planes &y) {
   for (int r = island.begin; r < island.end; ++r) {
     const RodRange &rod = dofs.rods()[r];
     for (int a = 0; a < slot_size; ++a) std::fill(y[a] + rod.first_slot, y[a] + rod.vertexEnd() + 2, 0.0);
-    for (const JoinedEdge &j : dofs.joinedEdges({r, r + 1})) y.setVector(0, j.frame, Vec3::Zero());
-    potential_->blocks().multiply(rod, dofs.joinedEdges({r, r + 1}), x, y);
+    dofs.forBeside({r, r + 1}, [&](int s) { y.setVector(0, s, Vec3::Zero()); });
+    potential_->blocks().multiply(rod, dofs.joins(r), x, y);
     dofs.fold(rod, y);
   }
   dofs.foldJoined(island, y);
@@ -216,8 +216,8 @@ PetscErrorCode NewtonSolver::includeMotion(Vec y) {
     const RodRange &rod = dofs.rods()[r];
     for (int a = 0; a < slot_size; ++a)
       std::copy(gradient[a] + rod.first_slot, gradient[a] + rod.vertexEnd() + 2, right[a] + rod.first_slot);
-    for (const JoinedEdge &j : dofs.joinedEdges({r, r + 1})) right.setVector(0, j.frame, gradient.vector(0, j.frame));
-    potential_->blocks().multiply(rod, dofs.joinedEdges({r, r + 1}), work_->motion, right);
+    dofs.forBeside({r, r + 1}, [&](int s) { right.setVector(0, s, gradient.vector(0, s)); });
+    potential_->blocks().multiply(rod, dofs.joins(r), work_->motion, right);
     if (potential_->obstaclesGo(r)) potential_->addObstacleMotion(r, right);
     dofs.fold(rod, right);
   }

@@ -163,8 +163,7 @@ void IncrementalPotential::assembleRod(int r, HessianKind hessian) {
   for (int a = 0; a < slot_size; ++a)
     for (int s = rod.first_slot; s < rod.vertexEnd() + 2; s += lanes)
       addTo(d.gradient[a] + s, read<Pack>(d.equilibrium[a] + s));
-  for (const JoinedEdge &j : elements_.joinedEdges({r, r + 1}))
-    d.gradient.setVector(0, j.frame, d.equilibrium.vector(0, j.frame));
+  dofs_.forBeside({r, r + 1}, [&](int s) { d.gradient.setVector(0, s, d.equilibrium.vector(0, s)); });
   dofs_.fold(rod, d.gradient);
   dofs_.fold(rod, d.equilibrium);
   if (hessian != HessianKind::none) d.blocks.fold(rod);

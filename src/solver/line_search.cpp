@@ -52,7 +52,7 @@ bool NewtonSolver::tryCorrected(RodSet island, double length, double *free) {
     for (int r = island.begin; r < island.end; ++r) {
       const RodRange &rod = dofs.rods()[r];
       for (int s = rod.first_slot; s < rod.vertexEnd() + (rod.closed ? 2 : 0); ++s) visit(s);
-      for (const JoinedEdge &j : dofs.joinedEdges({r, r + 1})) visit(j.frame);
+      dofs.forBeside({r, r + 1}, visit);
     }
   };
   each([&](int s) {
@@ -209,8 +209,10 @@ bool NewtonSolver::search(RodSet island, double *lambda) {
         const Pack step = read<Pack>(work_->increment[a] + s);
         write(work_->increment[a] + s, moving ? Pack(read<Pack>(work_->motion[a] + s) - step) : Pack(-step));
       }
-    for (const JoinedEdge &j : dofs.joinedEdges({r, r + 1}))
-      work_->increment.setVector(0, j.frame, -work_->increment.vector(0, j.frame));
+    dofs.forBeside({r, r + 1}, [&](int s) {
+      const Vec3 step = work_->increment.vector(0, s);
+      work_->increment.setVector(0, s, moving ? Vec3(work_->motion.vector(0, s) - step) : Vec3(-step));
+    });
     d.before.include(energyAtIterate(r));
   }
   IncrementalPotential::RodEnergy after;
@@ -286,6 +288,7 @@ void NewtonSolver::predict() {
         work_->increment[3][rod.slot(i)] = rod.twist ? rule.guess.atEdge(rod.first_edge + i) : 0;
       dofs.copyBehindRing(rod, work_->increment);
     }
+    dofs.copyJoined(island, work_->increment);
     potential_->turnFrames(island, work_->increment);
     if (!potential_->tryMove(work_->increment, 1, island, kind, work_->trial)) continue;
     double before = 0, after = 0;

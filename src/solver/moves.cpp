@@ -34,7 +34,7 @@ bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r,
     const double next = nextObstacleTime(r);
     trial.setObstacleTime(r, part == 1 ? next : now + part * (next - now));
   }
-  if (!elements_.joinedVertices({r, r + 1}).empty()) kind = RetractionKind::additive;
+  if (dofs_.isJoined({r, r + 1})) kind = RetractionKind::additive;
   if (!retraction_.apply(iterate_, increment, scale, r, kind, trial)) return false;
   setTrialForces(increment, scale, r, kind, trial);
   const double fraction = freeFraction(iterate_, trial, r);
@@ -220,7 +220,7 @@ bool IncrementalPotential::moveOn(double time, const StageRule &end) {
         for (int l = 0; l < std::min(lanes, rod.edges - i); ++l)
           increment[3][rod.slot(i + l)] = end.guess.atEdge(rod.first_edge + i + l) - spun[l];
       }
-      for (const JoinedEdge &j : elements_.joinedEdges({r, r + 1})) increment.setVector(0, j.frame, Vec3::Zero());
+      dofs_.forBeside({r, r + 1}, [&](int s) { increment.setVector(0, s, Vec3::Zero()); });
       dofs_.copyBehindRing(rod, increment);
       if (!tryMove(increment, 1, r, RetractionKind::additive, trial)) return false;
       accept(trial, r);

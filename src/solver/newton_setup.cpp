@@ -68,6 +68,7 @@ PetscErrorCode registerSolvers() {
   PetscCall(SNESLineSearchRegister(line_search_name, createLineSearch));
   PetscCall(registerBanded());
   PetscCall(registerCondensed());
+  PetscCall(registerWoodbury());
   PetscFunctionReturn(0);
 }
 
@@ -98,11 +99,11 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
   PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &cholesky));
   PetscCall(PCFactorGetMatSolverType(pc, &type));
   const std::string chosen = type ? type : "";
-  banded_ = cholesky && (chosen == "banded" || chosen == "condensed");
-  PetscCheck(!(joined && chosen == "banded") && !(chosen == "condensed" && !canCondense(dofs, set)), PETSC_COMM_SELF,
-             PETSC_ERR_SUP, "option -pc_factor_mat_solver_type: %s is for rods that %s", type,
-             joined && chosen == "banded" ? "nothing joins; take condensed, mumps or petsc"
-                                          : "do not bend where they run through junctions; take mumps or petsc");
+  banded_ = cholesky && (chosen == "banded" || chosen == "condensed" || chosen == "woodbury");
+  PetscCheck(!banded_ || canFactor(chosen, dofs, set), PETSC_COMM_SELF, PETSC_ERR_SUP,
+             "option -pc_factor_mat_solver_type: %s cannot factor these rods: banded is for those that nothing joins, "
+             "condensed for junctions, woodbury for constraints between vertices; take %s or mumps",
+             type, ownSolver(dofs, set) ? ownSolver(dofs, set) : "petsc");
   if (banded_) // factored straight from the band; every other solver gets a matrix of PETSc's own
     PetscCall(createBandedMatrix(&system_, jacobian_.out()));
   else
@@ -115,10 +116,11 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
     PetscCall(KSPSetType(inertia_, KSPPREONLY));
     PetscCall(KSPGetPC(inertia_, &pc));
     PetscCall(PCSetType(pc, PCCHOLESKY));
-    PetscCheck(!joined || canCondense(dofs, set), PETSC_COMM_SELF, PETSC_ERR_SUP,
-               "option -ksp_type, -pc_type: rods run through junctions, and what tells a minimum is a factorisation; "
+    const char *own = ownSolver(dofs, set);
+    PetscCheck(own, PETSC_COMM_SELF, PETSC_ERR_SUP,
+               "option -ksp_type, -pc_type: of rods that are joined like these a factorisation tells a minimum; "
                "take -pc_type cholesky");
-    PetscCall(PCFactorSetMatSolverType(pc, joined ? "condensed" : "banded"));
+    PetscCall(PCFactorSetMatSolverType(pc, own));
     PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGNATURAL));
   }
   PetscFunctionReturn(0);
@@ -152,7 +154,7 @@ PetscErrorCode NewtonSolver::createSnes() {
   PetscCall(KSPSetType(ksp, KSPPREONLY));
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(PCSetType(pc, PCCHOLESKY));
-  const char *own = !dofs.isJoined(rods_) ? "banded" : canCondense(dofs, rods_) ? "condensed" : nullptr;
+  const char *own = ownSolver(dofs, rods_);
   PetscCall(PCFactorSetMatSolverType(pc, own ? own : MATSOLVERMUMPS));
   PetscCall(PCFactorSetMatOrderingType(pc, own ? MATORDERINGNATURAL : MATORDERINGEXTERNAL));
   PetscCall(PCFactorSetZeroPivot(

@@ -30,6 +30,8 @@ std::vector<RodScale> rodScales(const Scene &scene, const Elements &elements) {
     scale.load = loadScale(scene, int(r), scale.length);
     scales.push_back(scale);
   }
+  for (const Constraint &c : scene.constraints)
+    if (c.isTie()) scales[c.to_rod].pinning += c.stiffness;
   return scales;
 }
 

@@ -28,6 +28,13 @@ bool CondensedFactor::suits(const DofMap &dofs, RodSet rods) {
   return true;
 }
 
+bool CondensedFactor::pays(const DofMap &dofs, RodSet rods) {
+  constexpr int most = 800; // nets of scissors, docs/performance.md
+  const auto joined = dofs.joinedVertices(rods);
+  return std::count_if(joined.begin(), joined.end(), [&](const JoinedVertex &j) { return runsThrough(dofs, j); }) <=
+         most;
+}
+
 /// Numbers the unknowns of the junctions, and cuts the rods there.
 void CondensedFactor::cut() {
   const PetscInt first = dofs_.firstUnknown(rods_);

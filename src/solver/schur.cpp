@@ -114,9 +114,13 @@ private:
 
 } // namespace
 
+std::unique_ptr<Schur> makeDense(int size, std::vector<int> rows, std::vector<int> columns) {
+  return std::make_unique<DenseSchur>(size, std::move(rows), std::move(columns));
+}
+
 std::unique_ptr<Schur> makeSchur(int size, std::vector<int> rows, std::vector<int> columns) {
   constexpr int most_dense = 200;
-  if (size <= most_dense) return std::make_unique<DenseSchur>(size, std::move(rows), std::move(columns));
+  if (size <= most_dense) return makeDense(size, std::move(rows), std::move(columns));
   return std::make_unique<SparseSchur>(size, rows, columns);
 }
 

@@ -38,8 +38,9 @@ void NewtonSolver::weigh(const Planes &motion, Planes &weighed) const {
     const RodRange &rod = dofs.rods()[r];
     for (int a = 0; a < slot_size; ++a)
       for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) weighed[a][s] = work_->metric[a][s] * motion[a][s];
-    for (const JoinedEdge &j : dofs.joinedEdges({r, r + 1}))
-      weighed.setVector(0, j.frame, work_->metric.vector(0, j.frame).cwiseProduct(motion.vector(0, j.frame)));
+    dofs.forBeside({r, r + 1}, [&](int s) {
+      weighed.setVector(0, s, work_->metric.vector(0, s).cwiseProduct(motion.vector(0, s)));
+    });
   }
   dofs.foldJoined(rods_, weighed);
 }
@@ -110,8 +111,7 @@ PetscErrorCode NewtonSolver::criticalMode(int stable, double *lift, Planes *mode
         const double d = (*mode)[a][s] = work_->increment[a][s];
         if (a < 3 && std::abs(d) > std::abs(largest) * (1 + 1e-6)) largest = d;
       }
-    for (const JoinedEdge &j : potential_->dofs().joinedEdges({r, r + 1}))
-      mode->setVector(0, j.frame, work_->increment.vector(0, j.frame));
+    potential_->dofs().forBeside({r, r + 1}, [&](int s) { mode->setVector(0, s, work_->increment.vector(0, s)); });
   }
   if (largest < 0)
     for (double &d : *mode) d = -d;
@@ -158,8 +158,7 @@ void improve(const DofMap &dofs, RodSet island, const Probe &w, Probe &x, Probe 
           here[s] = share[1] * here[s] + last[s];
         };
         for (int s = rod.first_slot; s < rod.vertexEnd() + 2; ++s) combined(s);
-        for (const JoinedEdge &j : dofs.joinedEdges({r, r + 1}))
-          if (a < 3) combined(j.frame);
+        if (a < 3) dofs.forBeside({r, r + 1}, combined);
       }
     }
   };
@@ -212,7 +211,7 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
       for (int r = rods_.begin; r < rods_.end; ++r) {
         const RodRange &rod = e.rods[r];
         if (buckling)
-          softening.multiply(rod, dofs.joinedEdges({r, r + 1}), v, y);
+          softening.multiply(rod, dofs.joins(r), v, y);
         else
           addMetric(work_->metric, system_.edge_metric, rod, dofs.joinedEdges({r, r + 1}), work_->shift[r], v, y);
         dofs.fold(rod, y);
@@ -262,8 +261,7 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
         for (int a = 0; a < slot_size; ++a)
           std::copy(w.motion[a] + e.rods[r].first_slot, w.motion[a] + e.rods[r].vertexEnd() + 2,
                     work_->increment[a] + e.rods[r].first_slot);
-        for (const JoinedEdge &j : dofs.joinedEdges({r, r + 1}))
-          work_->increment.setVector(0, j.frame, w.motion.vector(0, j.frame));
+        dofs.forBeside({r, r + 1}, [&](int s) { work_->increment.setVector(0, s, w.motion.vector(0, s)); });
       }
     }
     done = done || definite || (settled && !buckling);

@@ -90,7 +90,7 @@ bool NewtonSolver::isLittle(int r, double *size) {
 /// What rounding may change v'K v by, with K as it is assembled.
 double NewtonSolver::hessianNoise(int r, const Planes &v) const {
   const Elements &e = potential_->elements();
-  return 512 * epsilon * potential_->blocks().magnitude(e.rods[r], e.joinedEdges({r, r + 1}), v);
+  return 512 * epsilon * potential_->blocks().magnitude(e.rods[r], potential_->dofs().joins(r), v);
 }
 
 /// Whether the last increment of a rod in statics costs no more energy than the rounding of its Hessian: a turn of a

@@ -305,6 +305,11 @@ static void moveAll(const RodRange &rod, const Vec3 &by, C &to) {
                  about = 0.5 * turn.dot(before.tangent + after.tangent);
     to[C::spin][j.frame] = from[C::spin][j.frame] + principal + 2 * pi * std::round((about - principal) / (2 * pi));
   }
+  for (const Tie &t : elements_.ties({r, r + 1})) {
+    Vec3 high = from.positionAt(t.copy), low = from.values().vector(C::position_low, t.copy);
+    for (int a = 0; a < 3; ++a) addTwoWords(high[a], low[a], scale * increment[a][t.copy]);
+    to.setPosition(t.copy, high, low);
+  }
   // Whole turns of the twist angle by continuity: the angle moves by the difference of the two spins, and by a little
   // holonomy. Half a turn is a barrier of the measure `tan`: no step leads across it.
   bool possible = true;

@@ -118,7 +118,8 @@ void setTarget(const Constraint &constraint, int slot, double motion_time, Confi
 
 void setTargets(const Scene &scene, const Elements &elements, double motion_time, Configuration &c) {
   for (std::size_t k = 0; k < scene.constraints.size(); ++k)
-    setTarget(scene.constraints[k], elements.constraint_slot[k], motion_time, c);
+    if (!scene.constraints[k].isTie()) // which has another vertex for its target: see setRod
+      setTarget(scene.constraints[k], elements.constraint_slot[k], motion_time, c);
 }
 
 Frame joinedFrame(const State &state, const Elements &elements, const JoinedEdge &j) {
@@ -170,6 +171,8 @@ Frame joinedFrame(const State &state, const Elements &elements, const JoinedEdge
     c.setPosition(j.frame, Vec3::Zero(), Vec3::Zero());
     c[C::spin][j.frame] = 0;
   }
+  for (const Tie &t : elements.ties({r, r + 1}))
+    c.setPosition(t.copy, state.position[t.vertex], state.position_low[t.vertex]);
   forCells(elements, r, [&]<class T>(const LooseCell &cell, int count) {
     const auto frames = cellFrames<T>(c, cell, count);
     write(c[C::twist] + cell.slot,

@@ -120,6 +120,16 @@ std::vector<Case> cases() {
     s.constraints[1].motion.velocity = Vec3(0, 1, 0);
     s.constraints[3].motion.angular_velocity = Vec3(2, 1, -1);
   });
+  add("ties", true, [](Scene &s) { // within one rod: one beyond its saturation, one below
+    for (const auto &[from, to] : {std::pair(3, 8), std::pair(10, 5)}) {
+      Constraint &c = s.constraints.emplace_back(constraintOn(0, from, Constraint::Kind::pin, 30));
+      c.to_rod = 0;
+      c.to_vertex = to;
+      c.saturation = from == 3 ? 0.05 : 5;
+      c.damping = 2;
+    }
+    s.rods[0].initial_velocity = Vec3(1, -2, 3);
+  });
   add("a cable", true, [](Scene &s) {
     s.rods[0].material.flexural_stiffness = {0, 0};
     s.supports = {hold(s, 0, 0, Support::Kind::pin)};
@@ -151,6 +161,7 @@ struct Bench {
       for (int a = 0; a < slot_size; ++a)
         if (sim.dofs.unknown(s, a) >= 0) d[a][s] = random() * (a < 3 ? size : twist);
     sim.dofs.copyBehindRing(rod(), d);
+    sim.dofs.copyJoined(sim.dofs.all(), d);
     return d;
   }
   double dot(const Planes &a, const Planes &b) const {

@@ -10,9 +10,10 @@
 
 namespace tendril {
 
-/// Where a stencil acts: on a vertex (its position, 3 variables) or an edge (its vector and twist, 4 variables).
-enum class SiteKind { vertex, edge };
-constexpr int sizeOf(SiteKind kind) { return kind == SiteKind::vertex ? 3 : edge_size; }
+/// Where a stencil acts: on a vertex (its position, 3 variables), an edge (its vector and twist, 4 variables), or a
+/// vertex and what a tie has it tied to (their difference, 3 variables).
+enum class SiteKind { vertex, edge, tie };
+constexpr int sizeOf(SiteKind kind) { return kind == SiteKind::edge ? edge_size : 3; }
 
 /// Derivatives of one stencil over the variables of its sites, one site after the other.
 template <int n> struct Local {
@@ -21,22 +22,25 @@ template <int n> struct Local {
 };
 
 /// Adds what one site has with itself to the derivatives of its rod. \param first of its variables
+/// \param slot of the site \param target slot of the copy that a tie has
 template <SiteKind kind, int n>
-void addSite(const Local<n> &local, int first, int slot, const BlockPlanes *blocks, Derivatives &out) {
+void addSite(const Local<n> &local, int first, int slot, const BlockPlanes *blocks, Derivatives &out, int target = -1) {
   for (int a = 0; a < 3; ++a) {
     const double g = local.gradient[first + a];
     if constexpr (kind == SiteKind::edge) out.equilibrium[a][slot + 1] += g;
+    if constexpr (kind == SiteKind::tie) out.equilibrium[a][target] -= g;
     out.equilibrium[a][slot] += kind == SiteKind::edge ? -g : g;
   }
   if constexpr (kind == SiteKind::edge) out.equilibrium[3][slot] += local.gradient[first + 3];
   if (!blocks) return;
+  const int at = kind == SiteKind::tie ? target : slot;
   for (int a = 0; a < sizeOf(kind); ++a)
     for (int b = a; b < sizeOf(kind); ++b)
-      (kind == SiteKind::edge ? blocks->own(a, b) : blocks->vertex(a, b))[slot] += local.hessian(first + a, first + b);
+      (kind == SiteKind::edge ? blocks->own(a, b) : blocks->vertex(a, b))[at] += local.hessian(first + a, first + b);
 }
 
-/// A term made of stencils that act on one site each: they stand in the blocks of their rod, which stays on its own. A
-/// Stencil has
+/// A term made of stencils that act on one site each: they stand in the blocks of their rod, which stays on its own
+/// but for ties. A Stencil has
 ///   static constexpr SiteKind site;  int rod, slot;
 ///   void begin(const Configuration &start, const Step &step);   before the iterations of a step
 ///   void moveIterate(const Configuration &iterate);             whenever it has moved
@@ -80,7 +84,7 @@ public:
     for (const Stencil &s : of_[rod]) {
       Local<sizeOf(Stencil::site)> local;
       s.derivatives(c, kind, local);
-      addSite<Stencil::site>(local, 0, s.slot, kind == HessianKind::none ? nullptr : &blocks, out);
+      addSite<Stencil::site>(local, 0, s.slot, kind == HessianKind::none ? nullptr : &blocks, out, s.target);
     }
   }
   std::array<Vec3, 2> actionFrom(int slot, const Configuration &c, int rod) const override {

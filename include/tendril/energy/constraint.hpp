@@ -38,7 +38,8 @@ struct EdgeDerivatives {
 /// \param curved whether the terms of second order count
 EdgeDerivatives overEdge(const Frame &frame, const VectorDerivatives &by_spin, bool curved);
 
-/// From the target to what is drawn there: distance of the vertex, or rotation vector to the frame of the edge.
+/// From the target, the other vertex of a tie, to what is drawn there: distance of the vertex, or rotation vector to
+/// the frame of the edge.
 Vec3 deviation(const Elements &elements, const Constraint &constraint, int slot, const Configuration &c);
 /// What the damper of a constraint acts on: the distance over the rod's length, in the first column, or the rotation
 /// from the target, in its frame. From where the target was without its motion, if the damper stands still.

@@ -14,8 +14,10 @@
 #include "tendril/layout/petsc.hpp"
 #include "tendril/model/scene.hpp"
 
+#include <algorithm>
 #include <array>
 #include <span>
+#include <unordered_map>
 
 namespace tendril {
 
@@ -31,13 +33,25 @@ public:
   /// Unknown of a slot's x, y, z (a = 0, 1, 2) or twist (3), or -1 where it is held or does not exist.
   PetscInt unknown(int slot, int a) const { return unknown_[std::size_t(slot_size) * slot + a]; }
   bool isHeld(int vertex) const { return held_[vertex]; }
-  /// Rods that junctions join, with all between them in the order of the scene; a rod that nothing joins is one by
-  /// itself.
+  /// Rods that junctions and ties join, with all between them in the order of the scene; a rod that nothing joins is
+  /// one by itself.
   RodSet islandOf(int rod) const { return islands_.empty() ? RodSet{rod, rod + 1} : islands_[rod]; }
-  bool isJoined(RodSet rods) const { return !joinedVertices(rods).empty(); }
+  /// Whether a junction or a tie meets any of some rods.
+  bool isJoined(RodSet rods) const {
+    return !islands_.empty() && std::find(joined_.begin() + rods.begin, joined_.begin() + rods.end, char(true)) !=
+                                    joined_.begin() + rods.end;
+  }
   /// Those of some rods, by rod.
   std::span<const JoinedVertex> joinedVertices(RodSet rods) const { return joined_vertices_.of(rods); }
   std::span<const JoinedEdge> joinedEdges(RodSet rods) const { return joined_edges_.of(rods); }
+  std::span<const Tie> ties(RodSet rods) const { return ties_.of(rods); }
+  Joins joins(int rod) const { return {joinedEdges({rod, rod + 1}), ties({rod, rod + 1})}; }
+  /// Calls visit(slot) for the slots beside rods that have unknowns or copies: frames of junctions, ends of ties.
+  template <class Visit> void forBeside(RodSet rods, Visit visit) const {
+    for (const JoinedEdge &j : joinedEdges(rods)) visit(j.frame);
+    for (const Tie &t : ties(rods)) visit(t.copy);
+  }
+  const ByRod<Tie> &ties() const { return ties_; }
   const ByRod<JoinedVertex> &joinedVertices() const { return joined_vertices_; }
   const ByRod<JoinedEdge> &joinedEdges() const { return joined_edges_; }
   int groups() const { return groups_; } ///< rigid ones of all junctions
@@ -50,6 +64,8 @@ public:
     std::vector<std::ptrdiff_t> source;
     std::vector<double> entries;
   };
+  /// For slots of some rods that are copies in junctions, those that have the unknowns.
+  std::unordered_map<int, int> firstSlots(RodSet rods) const;
   /// Matrix of PETSc's own type over the unknowns of some rods, preallocated for their blocks.
   /// \param joins as EdgeBlocks::joins
   PetscErrorCode createMatrix(RodSet rods, bool joins, Mat *matrix, Pattern *pattern) const;
@@ -60,7 +76,7 @@ public:
   void copyBehindRing(const RodRange &rod, Planes &increment) const;
   /// Adds what was summed into the copies behind a ring to the slots they stand for.
   void fold(const RodRange &rod, Planes &sums) const;
-  /// Positions of first members, and spins of first frames, to their copies in whole islands.
+  /// Positions of first members and of ends of ties, and spins of first frames, to their copies in whole islands.
   void copyJoined(RodSet islands, Planes &increment) const;
   /// Adds what was summed into those copies to what they stand for.
   void foldJoined(RodSet islands, Planes &sums) const;
@@ -89,13 +105,16 @@ private:
   std::vector<PetscInt> unknown_, unknown_begin_;
   ByRod<JoinedVertex> joined_vertices_;
   ByRod<JoinedEdge> joined_edges_;
+  ByRod<Tie> ties_;
   int groups_ = 0;
-  std::vector<RodSet> islands_;  ///< per rod; empty without junctions
+  std::vector<RodSet> islands_;  ///< per rod; empty where nothing joins any
+  std::vector<char> joined_;     ///< per rod, as islands
   std::vector<int> unknown_end_; ///< slot behind the last with unknowns, per rod
   OwnedDM dm_;
 
   PetscErrorCode createSection(PetscSection *section) const;
   void join(const Scene &scene, std::vector<int> free_slots);
+  void makeIsland(RodSet a, RodSet b);
 };
 
 } // namespace tendril

@@ -21,7 +21,7 @@ inline constexpr int joined_entries = slot_entries + 3 * edge_size;
 /// The 32 or 44 entries of a slot are planes over the slots of a rod. Behind a ring, the copy of its first slot holds
 /// what the last edge has with the first; the other copies are added to what they stand for (fold). Of an edge that is
 /// joined to a frame, the frame's spin is the position at its slot, and what it has with the edge is `across` at the
-/// slot of the half cell, spin by edge.
+/// slot of the half cell, spin by edge. What a tie has is `vertex` at the slot of its copy.
 class EdgeBlocks {
 public:
   /// Planes of a slot's entries. Edge variables r, c in 0..3: e_x, e_y, e_z, twist.
@@ -55,11 +55,11 @@ public:
   void fold(const RodRange &rod);
   /// y += A x for one rod in vertex coordinates (x, y, z, twist of each slot), copies behind a ring included in x and
   /// in y.
-  void multiply(const RodRange &rod, std::span<const JoinedEdge> joined, const Planes &x, Planes &y) const;
+  void multiply(const RodRange &rod, const Joins &joins, const Planes &x, Planes &y) const;
 
   /// Root of the sum of (x_i A_ij x_j)^2 over the entries of one rod: rounding of the entries, each its own, changes
   /// x'A x by an epsilon of it.
-  double magnitude(const RodRange &rod, std::span<const JoinedEdge> joined, const Planes &x) const;
+  double magnitude(const RodRange &rod, const Joins &joins, const Planes &x) const;
 
   /// Where the plane of an entry begins in data().
   std::size_t offset(const RodRange &rod, int plane) const {

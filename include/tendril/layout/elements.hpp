@@ -60,7 +60,7 @@ public:
   const double *cellLength() const { return constants_[6]; }        ///< Lbar [m]
   /// stiffness, 3 planes; rest, 3; weight, 2; free, 2; base, 1 (CellOf)
   const Planes &cells() const { return cells_; }
-  /// Constraints on a rod, by number, and its pins; empty where the scene has none.
+  /// Constraints on a rod, by number, and its pins to the world; empty where the scene has none.
   std::span<const int> constraintsOf(int rod) const {
     return constraints_.empty() ? std::span<const int>() : std::span<const int>(constraints_[rod]);
   }
@@ -68,6 +68,7 @@ public:
   double length(int rod) const { return length_[rod]; } ///< at rest [m]
   std::span<const JoinedEdge> joinedEdges(RodSet set) const { return joined_edges_.of(set); }
   std::span<const JoinedVertex> joinedVertices(RodSet set) const { return joined_vertices_.of(set); }
+  std::span<const Tie> ties(RodSet set) const { return ties_.of(set); }
   const Frame &frameAsDrawn(const JoinedEdge &j) const { return joined_frame_[&j - joined_edges_.items.data()]; }
   int vertices() const { return int(vertex_slot.size()); }
   int edges() const { return int(edge_slot.size()); }
@@ -79,6 +80,7 @@ private:
   std::vector<double> length_; ///< per rod
   ByRod<JoinedEdge> joined_edges_;
   ByRod<JoinedVertex> joined_vertices_;
+  ByRod<Tie> ties_;
   std::vector<Frame> joined_frame_;           ///< as drawn, of unit length
   std::vector<std::vector<int>> constraints_; ///< per rod
   std::vector<Pins> pins_;                    ///< per rod

@@ -68,6 +68,20 @@ struct JoinedEdge {
   bool isFirst() const { return frame == first_frame; }
 };
 
+/// A pin between two vertices. Beside the rod of the one stands a copy of the other's position, so that the pin is a
+/// matter of that rod alone. Its Hessian by the difference is where that of the copy would be.
+struct Tie {
+  int rod, slot, copy;
+  int vertex, of; ///< the other one, over all rods, and its slot
+  int constraint;
+};
+
+/// What junctions and ties add to the matrix of some rods.
+struct Joins {
+  std::span<const JoinedEdge> edges;
+  std::span<const Tie> ties;
+};
+
 /// Unknowns of a slot: x, y, z, twist.
 inline constexpr int slot_size = 4;
 

@@ -76,7 +76,8 @@ struct Constraint {
   enum class Measure { angle, sine };
   std::string name;
   int rod, at;                      ///< vertex of a pin, edge of a rotation
-  Vec3 point;                       ///< of a pin, without its motion [m]
+  int to_rod = -1, to_vertex = -1;  ///< of a pin to another vertex, or -1
+  Vec3 point;                       ///< of a pin to the world, without its motion [m]
   Frame frame;                      ///< of a rotation, without its motion; length 1
   Motion motion;                    ///< of the point, or of the frame
   double stiffness;                 ///< [N/m] or [N m/rad]
@@ -87,6 +88,8 @@ struct Constraint {
   bool point_given = false, tangent_given = false, director_given = false; ///< by the scene, otherwise as drawn
 
   bool isPin() const { return kind == Kind::pin; }
+  /// A pin to another vertex: both are drawn to each other.
+  bool isTie() const { return to_rod >= 0; }
   /// What rows of a trajectory and the rods' own memory need room for, in slots.
   int slots() const { return isPin() ? 1 : 3; }
   Vec3 pointAt(double time) const { return point + motion.displacementAt(time); }
@@ -125,6 +128,8 @@ struct Scene {
   std::vector<Support> supports;
   std::vector<Constraint> constraints;
   std::vector<Junction> junctions;
+  /// Whether junctions or ties join rods.
+  bool isJoined() const;
   std::vector<NodalForce> forces;
   std::vector<EdgeMoment> moments;
   std::vector<Collider> colliders;

@@ -11,6 +11,7 @@
 #include "tendril/layout/dof_map.hpp"
 
 #include <numeric>
+#include <string>
 
 namespace tendril {
 
@@ -84,11 +85,14 @@ private:
   template <class T> void solveGroup(const Group &group, const PetscScalar *b, PetscScalar *x);
 };
 
-/// Registers `-pc_factor_mat_solver_type banded`, and condensed (condensed.hpp).
+/// Registers `-pc_factor_mat_solver_type banded`, condensed (condensed.hpp) and woodbury (woodbury.hpp).
 PetscErrorCode registerBanded();
 PetscErrorCode registerCondensed();
-/// Whether condensed can factor some rods.
-bool canCondense(const DofMap &dofs, RodSet rods);
+PetscErrorCode registerWoodbury();
+/// Which of them is for some rods; null where another is cheaper or none can factor them.
+const char *ownSolver(const DofMap &dofs, RodSet rods);
+/// Whether one of them can factor some rods.
+bool canFactor(const std::string &solver, const DofMap &dofs, RodSet rods);
 /// Matrix whose entries are those of `system`, which must outlive it; its Cholesky factorisation is `banded`. Increase
 /// its state (PetscObjectStateIncrease) when the values have changed.
 PetscErrorCode createBandedMatrix(BandedSystem *system, Mat *matrix);

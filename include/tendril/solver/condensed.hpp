@@ -20,6 +20,8 @@ public:
   /// Whether it can factor some rods: where one that bends runs through a junction without a frame, the next vertex
   /// must be neither held nor in a junction.
   static bool suits(const DofMap &dofs, RodSet rods);
+  /// Whether it is cheaper than MUMPS: a rod that runs through couples all of its junctions.
+  static bool pays(const DofMap &dofs, RodSet rods);
 
   void factor(const BandedSystem &system);
   /// By the unknowns of the rods; x may be b.

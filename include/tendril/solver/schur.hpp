@@ -18,8 +18,9 @@ public:
   virtual const char *kind() const = 0;
   int negative = 0;
 };
-/// Dense for few unknowns, by LAPACK with pivoting; sparse for many, by PETSc without.
-/// \param rows, columns of the entries, both triangles
+/// Dense, by LAPACK with pivoting. \param rows, columns of the entries, both triangles
+std::unique_ptr<Schur> makeDense(int size, std::vector<int> rows, std::vector<int> columns);
+/// Dense for few unknowns; sparse for many, by PETSc without pivoting.
 std::unique_ptr<Schur> makeSchur(int size, std::vector<int> rows, std::vector<int> columns);
 
 } // namespace tendril
