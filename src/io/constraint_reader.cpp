@@ -47,6 +47,7 @@ void readOther(YamlMap &map, const SceneFile &file, Constraint &c) {
   const Scene &scene = file.scene;
   const YamlValue value = map.at("constraints[].to");
   YamlMap to(value, "constraints[].to");
+  to.refuseUnknown();
   const std::vector<int> rods = readTargets(to, "constraints[].to.rod", file.names);
   if (rods.size() != 1) value.fail("the other end is on one rod; name it");
   c.to_rod = rods.front();

@@ -76,6 +76,13 @@ def exampleScene(path, value):
         turns = name in ("edge", "tangent", "director", "measure", "angular_velocity")
         scene["constraints"][0]["type"] = "rotation" if turns else "pin"
         put(scene, "constraints[].edge" if turns else "constraints[].vertex", "last")
+    if path.startswith("constraints[].to."):  # a second rod
+        put(scene, "constraints[].rod", 0)
+        put(scene, "constraints[].to.rod", 1)
+        if name != "closest":
+            put(scene, "constraints[].to.vertex", 0)
+        put(scene, "rods[].line", {"from": [0, 0, 0], "to": [1, 0, 0], "edges": 6})
+        scene["rods"].append({"line": {"from": [1, 0, 0], "to": [1, 1, 0], "edges": 6}, "material": "default"})
     if path.startswith(("colliders", "contact", "rods[].contact")):
         obstacle = scene.setdefault("colliders", [{}])[0]
         if not any(shape in obstacle for shape in ("plane", "sphere", "capsule", "cylinder", "box", "tube", "mesh")):

@@ -50,7 +50,7 @@ TEST(Ties, ComeToTheBallJointAsTheyGetStiffer) {
     };
     int exact_iterations = 0;
     const std::vector<Vec3> exact = middle(0, &exact_iterations);
-    EXPECT_GT(std::abs(exact[10][2]), 0.005);
+    EXPECT_GT(std::abs(exact[10][2]), 0.003);
     std::vector<double> errors;
     for (const double k : {1e5, 1e6, 1e7, 1e8}) {
       int iterations = 0;
@@ -86,14 +86,17 @@ TEST(Ties, HoldARodThatNothingElseHolds) {
   }
 }
 
-/// Forces between two free rods come in pairs along their line: momentum stays, angular momentum and the energy as the
-/// method keeps them; a damper takes energy away.
+/// Forces between two free rods come in pairs along their line: momentum and angular momentum stay, and the energy as
+/// the method keeps it; a damper takes energy away.
 TEST(Ties, KeepMomenta) {
   for (const double damping : {0.0, 0.5}) {
     Scene s;
     s.gravity = Vec3::Zero();
     s.rods = {beam({0, 0, 0}, {1, 0, 0}, 10, "a"), beam({0, 0.2, 0}, {0, 1.2, 0.3}, 8, "b")};
-    for (Rod &rod : s.rods) rod.material.linear_density = 1;
+    for (Rod &rod : s.rods) {
+      rod.material.linear_density = 1;
+      rod.material.linear_rotational_inertia = 1e-6; // its momentum is left out below
+    }
     s.rods[0].initial_velocity = Vec3(0.3, -0.2, 0.5);
     s.constraints = {tie(0, 3, 1, 0, 40), tie(1, 8, 0, 10, 5)};
     for (Constraint &c : s.constraints) c.damping = damping;
@@ -117,12 +120,12 @@ TEST(Ties, KeepMomenta) {
     std::swap(sim.state, end.state);
     const auto after = momenta();
     EXPECT_LT((after[0] - before[0]).norm(), 1e-7 * before[0].norm());
-    EXPECT_LT((after[1] - before[1]).norm(), 1e-5 * before[1].norm() + 1e-5);
     const double now = energyBudget(sim.scene, *sim.elements, sim.state, 1).total();
     EXPECT_GT(energyBudget(sim.scene, *sim.elements, sim.state, 1).constraint, 0);
-    if (damping == 0)
+    if (damping == 0) {
+      EXPECT_LT((after[1] - before[1]).norm(), 1e-5 * before[1].norm());
       EXPECT_NEAR(now, energy, 0.02 * energy);
-    else
+    } else // not along the line between both, so that a damper takes angular momentum, too, while they are apart
       EXPECT_LT(now, 0.8 * energy);
   }
 }

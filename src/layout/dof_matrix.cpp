@@ -1,0 +1,110 @@
+/// Matrices of PETSc's own types over the unknowns of rods.
+#include "tendril/layout/dof_map.hpp"
+
+namespace tendril {
+namespace {
+
+/// An unknown that an edge variable is made of, or the position of a vertex: e_i = x_{i+1} - x_i.
+struct Part {
+  PetscInt unknown;
+  bool minus;
+};
+
+} // namespace
+
+std::unordered_map<int, int> DofMap::firstSlots(RodSet rods) const {
+  std::unordered_map<int, int> first;
+  for (const JoinedVertex &j : joinedVertices(rods)) first[j.slot] = j.first_slot;
+  for (const JoinedEdge &j : joinedEdges(rods)) first[j.frame] = j.first_frame;
+  return first;
+}
+
+PetscErrorCode DofMap::createMatrix(RodSet rods, bool joins, Mat *matrix, Pattern *pattern) const {
+  PetscFunctionBeginUser;
+  std::vector<PetscInt> row, column;
+  std::vector<std::ptrdiff_t> &source_of = pattern->source;
+  source_of.clear();
+  EdgeBlocks blocks(0, joins); // for its window
+  blocks.setOrigin(rods_[rods.begin].first_slot);
+  const PetscInt first = firstUnknown(rods);
+  const std::unordered_map<int, int> copies = firstSlots(rods);
+  auto shared = [&](int slot, int a) {
+    const auto found = copies.find(slot);
+    return unknown(found == copies.end() ? slot : found->second, a);
+  };
+  for (int r = rods.begin; r < rods.end; ++r) {
+    const RodRange &rod = rods_[r];
+    auto slot = [&](int i) { return rod.slot(rod.closed ? i % rod.vertices : i); };
+    auto edge = [&](int i, int r) {
+      std::vector<Part> parts;
+      if (r == 3)
+        parts = {{unknown(slot(i), 3), false}};
+      else
+        parts = {{shared(slot(i), r), true}, {shared(slot(i + 1), r), false}};
+      return parts;
+    };
+    auto position = [&](int i, int r) { return std::vector<Part>{{shared(slot(i), r), false}}; };
+    auto couple = [&](const std::vector<Part> &left, const std::vector<Part> &right, int plane, int i, bool once) {
+      const std::ptrdiff_t source = std::ptrdiff_t(blocks.offset(rod, plane)) + i;
+      for (const Part &a : left)
+        for (const Part &b : right) {
+          if (a.unknown < 0 || b.unknown < 0) continue;
+          for (const bool mirrored : {false, true}) {
+            if (mirrored && once) continue;
+            row.push_back((mirrored ? b.unknown : a.unknown) - first);
+            column.push_back((mirrored ? a.unknown : b.unknown) - first);
+            source_of.push_back(a.minus == b.minus ? source : ~source);
+          }
+        }
+    };
+    for (int i = 0; i < rod.edges; ++i)
+      for (int r = 0; r < edge_size; ++r)
+        for (int c = r; c < edge_size; ++c) couple(edge(i, r), edge(i, c), EdgeBlocks::own(r, c), i, r == c);
+    for (int i = 1; i < rod.edges + (rod.closed ? 1 : 0); ++i)
+      for (int r = 0; r < edge_size; ++r)
+        for (int c = 0; c < edge_size; ++c) couple(edge(i - 1, r), edge(i, c), EdgeBlocks::across(r, c), i, false);
+    for (int i = 0; i < rod.edges && joins; ++i)
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < edge_size; ++c) couple(position(i, r), edge(i, c), EdgeBlocks::joined(r, c), i, false);
+    for (int i = 0; i < rod.vertices; ++i)
+      for (int r = 0; r < 3; ++r)
+        for (int c = r; c < 3; ++c) couple(position(i, r), position(i, c), EdgeBlocks::vertex(r, c), i, r == c);
+    for (const JoinedEdge &j : joinedEdges({r, r + 1})) {
+      auto spin = [&](int a) { return std::vector<Part>{{shared(j.frame, a), false}}; };
+      for (int a = 0; a < 3; ++a) {
+        for (int c = a; c < 3; ++c)
+          couple(spin(a), spin(c), EdgeBlocks::vertex(a, c), j.frame - rod.first_slot, a == c);
+        for (int c = 0; c < edge_size; ++c)
+          couple(spin(a), edge(j.edge, c), EdgeBlocks::across(a, c), j.cell - rod.first_slot, false);
+      }
+    }
+    for (const Tie &t : ties({r, r + 1})) {
+      auto difference = [&](int a) { return std::vector<Part>{{shared(t.slot, a), false}, {shared(t.of, a), true}}; };
+      for (int a = 0; a < 3; ++a)
+        for (int c = a; c < 3; ++c)
+          couple(difference(a), difference(c), EdgeBlocks::vertex(a, c), t.copy - rod.first_slot, a == c);
+    }
+  }
+  const bool whole = rods.begin == 0 && rods.end == int(rods_.size());
+  PetscCall(MatCreate(whole ? PETSC_COMM_WORLD : PETSC_COMM_SELF, matrix));
+  PetscCall(MatSetSizes(*matrix, unknowns(rods), unknowns(rods), PETSC_DETERMINE, PETSC_DETERMINE));
+  PetscCall(MatSetType(*matrix, MATAIJ));
+  PetscCall(MatSetFromOptions(*matrix));
+  PetscCall(MatSetOption(*matrix, MAT_SYMMETRIC, PETSC_TRUE));
+  PetscCall(MatSetOption(*matrix, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
+  PetscCall(MatSetPreallocationCOO(*matrix, PetscCount(row.size()), row.data(), column.data()));
+  pattern->entries.resize(source_of.size());
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode DofMap::fillMatrix(const EdgeBlocks &blocks, Pattern &pattern, Mat matrix) {
+  PetscFunctionBeginUser;
+  for (std::size_t n = 0; n < pattern.source.size(); ++n) {
+    const std::ptrdiff_t from = pattern.source[n];
+    pattern.entries[n] = from >= 0 ? blocks.data()[from] : -blocks.data()[~from];
+  }
+  PetscCall(MatSetValuesCOO(matrix, pattern.entries.data(), INSERT_VALUES));
+  PetscFunctionReturn(0);
+}
+
+} // namespace tendril
