@@ -14,6 +14,7 @@
 #include "bench.hpp"
 
 #include "tendril/io/options.hpp"
+#include "tendril/layout/alone.hpp"
 #include "tendril/solver/events.hpp"
 
 #include <filesystem>
@@ -255,6 +256,7 @@ PetscErrorCode execute() {
 } // namespace tendril::bench
 
 int main(int argc, char **argv) {
+  tendril::startAlone();
   if (PetscInitialize(&argc, &argv, nullptr,
                       "bench_step: what whole Newton steps cost, without output (docs/performance.md).\n"))
     return 1;

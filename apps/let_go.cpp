@@ -9,6 +9,7 @@
 ///   let_go data/scenes/cantilever.yaml
 #include "tendril/dynamics/state_access.hpp"
 #include "tendril/io/scene_reader.hpp"
+#include "tendril/layout/alone.hpp"
 #include "tendril/solver/events.hpp"
 
 #include <cstdio>
@@ -75,6 +76,7 @@ PetscErrorCode letGo(const char *file) {
 } // namespace
 
 int main(int argc, char **argv) {
+  tendril::startAlone();
   if (PetscInitialize(&argc, &argv, nullptr, nullptr)) return 1;
   int exit_code = 1;
   if (argc < 2)

@@ -15,6 +15,7 @@
 #include "tendril/io/stop.hpp"
 #include "tendril/io/take_up.hpp"
 #include "tendril/io/text.hpp"
+#include "tendril/layout/alone.hpp"
 #include "tendril/solver/activity.hpp"
 #include "tendril/solver/events.hpp"
 
@@ -32,6 +33,7 @@ namespace {
 /// which -malloc_debug takes for corrupted.
 std::string initializePetsc(int *argc, char ***argv) {
   auto *const print = std::exchange(PetscErrorPrintf, &PetscErrorPrintfNone);
+  startAlone();
   const PetscErrorCode error = PetscInitialize(argc, argv, nullptr, nullptr);
   PetscErrorPrintf = print;
   if (!error) return {};
