@@ -15,6 +15,10 @@ void WidestAngle::include(const Scene &scene, const Elements &elements, const St
       const double length = edge.norm();
       return Frame{edge / length, state.director[range.first_edge + i], length};
     };
+    auto isCorner = [&](int vertex) { // which a junction keeps
+      const auto joined = elements.joinedEdges({r, r + 1});
+      return std::any_of(joined.begin(), joined.end(), [&](const JoinedEdge &j) { return j.vertex == vertex; });
+    };
     double bound = 1 + 2 * std::cos(angle);
     Frame before = frameOf(range.closed ? range.edges - 1 : 0);
     for (int i = range.closed ? 0 : 1; i < range.edges; ++i) {
@@ -24,7 +28,7 @@ void WidestAngle::include(const Scene &scene, const Elements &elements, const St
       const double tangents = before.tangent.dot(f.tangent), directors = before.director.dot(f.director);
       const double trace =
           tangents + directors + tangents * directors - before.tangent.dot(f.director) * before.director.dot(f.tangent);
-      if (trace < bound) {
+      if (trace < bound && !isCorner(i)) {
         const double turning = std::acos(std::clamp(tangents, -1.0, 1.0)),
                      twist = std::abs(halfAngleBetween(before, f).angle());
         if (std::max(turning, twist) > angle) *this = {std::max(turning, twist), r, i, state.time, every_measure};

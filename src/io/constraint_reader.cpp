@@ -49,7 +49,9 @@ void readOther(YamlMap &map, const SceneFile &file, Constraint &c) {
   YamlMap to(value, "constraints[].to");
   to.refuseUnknown();
   const std::vector<int> rods = readTargets(to, "constraints[].to.rod", file.names);
-  if (rods.size() != 1) value.fail("the other end is on one rod; name it");
+  if (rods.size() != 1)
+    value.fail("the other end is on one rod, as '" + scene.rods[rods.front()].name + "'; these are " +
+               std::to_string(rods.size()));
   c.to_rod = rods.front();
   const Rod &rod = scene.rods[c.to_rod];
   const bool closest = to.flag("constraints[].to.closest");
@@ -127,7 +129,10 @@ void readConstraint(const YamlValue &value, SceneFile &out) {
   YamlMap map(value, "constraints");
   const std::string type = map.word("constraints[].type");
   const YamlValue to = map.at("constraints[].to");
-  to.isMap() ? refuseForTie(map, type) : (void)map.word("constraints[].to");
+  if (to.isMap())
+    refuseForTie(map, type);
+  else if (!to.isScalar() || to.text() != "world")
+    to.fail("'to' must be world, or a map of the other vertex, as {rod: b, vertex: 0}");
   const std::vector<int> rods = readTargets(map, "constraints[].rod", out.names);
   const std::string name = map.has("constraints[].name") ? readName(map.at("constraints[].name"))
                                                          : "constraint" + std::to_string(out.constraint_blocks);

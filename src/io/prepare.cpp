@@ -34,7 +34,7 @@ void requireHeld(const Scene &scene) {
     if (!held[rootOf(r)])
       throw SceneError("rod '" + scene.rods[r].name +
                        "' is free to move as a whole: -mode static needs a clamp, pins or constraints that hold every "
-                       "rod, or one that it is joined to");
+                       "rod, or one that it is joined to; dampers hold nothing");
 }
 
 } // namespace

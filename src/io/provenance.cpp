@@ -37,11 +37,18 @@ Provenance provenance(int argc, char **argv) {
 }
 
 std::string groupsText(const Scene &scene) {
+  std::vector<std::vector<char>> corners(scene.rods.size()); // in rigid groups of junctions
+  for (const Junction &j : scene.junctions)
+    for (const Junction::Member &m : j.members) {
+      if (m.group < 0) continue;
+      corners[m.rod].resize(scene.rods[m.rod].vertices(), false);
+      corners[m.rod][m.vertex] = true;
+    }
   std::ostringstream s;
   s << std::setprecision(4);
   const std::size_t shown = std::min<std::size_t>(scene.rods.size(), 4);
   for (std::size_t r = 0; r < shown; ++r) {
-    const DimensionlessGroups g = dimensionlessGroups(scene.rods[r], scene.gravity);
+    const DimensionlessGroups g = dimensionlessGroups(scene.rods[r], scene.gravity, corners[r]);
     s << "rod '" << scene.rods[r].name << "': " << scene.rods[r].edges() << " edges, length " << g.length << " m";
     if (scene.rods[r].material.isCable())
       s << ", a cable\n";
@@ -55,7 +62,8 @@ std::string groupsText(const Scene &scene) {
   bool told = false;
   for (const Rod &rod : scene.rods) {
     if (rod.material.isCable()) continue; // free to fold
-    const DimensionlessGroups g = dimensionlessGroups(rod, scene.gravity);
+    const DimensionlessGroups g =
+        dimensionlessGroups(rod, scene.gravity, corners[std::size_t(&rod - scene.rods.data())]);
     turning = std::max(turning, g.largest_turning);
     twist = std::max(twist, g.largest_twist);
     if (told || !(g.corner_softness > soft)) continue;

@@ -44,9 +44,9 @@ std::string textOf(const Support &support) {
   return text + textOf(support.motion);
 }
 
-std::string textOf(const Constraint &c) {
+std::string textOf(const Constraint &c, const Scene &scene) {
   std::string text =
-      c.isTie()   ? "pin to vertex " + std::to_string(c.to_vertex) + " of rod " + std::to_string(c.to_rod)
+      c.isTie()   ? "pin to vertex " + std::to_string(c.to_vertex) + " of rod '" + scene.rods[c.to_rod].name + "'"
       : c.isPin() ? "pin to " + textOf(c.point)
                   : "rotation to tangent " + textOf(c.frame.tangent) + " and director " + textOf(c.frame.director);
   text += ", stiffness " + textOf(c.stiffness) + ", damping " + textOf(c.damping);
@@ -116,6 +116,8 @@ int compareFacts(const FactValues &before, const FactValues &now, bool options, 
   std::vector<std::string> lines;
   FactValues all = before;
   all.insert(now.begin(), now.end());
+  int order_line = -1;
+  bool holders_changed = false;
   for (const auto &[key, any] : all) {
     const auto old = before.find(key), present = now.find(key);
     const bool gone = present == now.end(), added = old == before.end();
@@ -130,6 +132,9 @@ int compareFacts(const FactValues &before, const FactValues &now, bool options, 
       continue; // earlier versions did not keep it
     for (int k = 0; k < 3; ++k)
       if (key.first == kinds[k]) kind = std::max(kind, k);
+    if (key.second == order_of_holders) order_line = int(lines.size());
+    holders_changed =
+        holders_changed || key.second.starts_with("constraint at ") || key.second.starts_with("support at ");
     const bool is_long = any.find('#') != std::string::npos;
     const std::string value = is_long ? "" : ": " + any;
     lines.push_back(gone      ? "no longer there: " + key.second + value
@@ -138,6 +143,7 @@ int compareFacts(const FactValues &before, const FactValues &now, bool options, 
                               : "changed since the checkpoint: " + key.second + ": " + old->second + " -> " +
                                     present->second);
   }
+  if (holders_changed && order_line >= 0) lines.erase(lines.begin() + order_line); // of others
   for (std::size_t k = 0; k < lines.size() && k < most; ++k) told->push_back(lines[k]);
   if (lines.size() > most) told->push_back("... and " + std::to_string(lines.size() - most) + " more changes");
   return kind;
@@ -231,8 +237,8 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
   for (const Constraint &c : scene.constraints) {
     const int what[] = {int(c.kind), c.rod, c.at};
     holders.add(what, sizeof what);
-    holders.add(textOf(c));
-    add(Kind::scene, at(c.isPin() ? "constraint at vertex " : "constraint at edge ", c.at, c.rod), textOf(c));
+    holders.add(textOf(c, scene));
+    add(Kind::scene, at(c.isPin() ? "constraint at vertex " : "constraint at edge ", c.at, c.rod), textOf(c, scene));
   }
   add(Kind::scene, order_of_holders, "#" + holders.hex());
   for (const Collider &c : scene.colliders) add(Kind::scene, "collider '" + c.name + "'", textOf(c));

@@ -226,8 +226,8 @@ void DofMap::join(const Scene &scene, std::vector<int> free_slots) {
     const Constraint &c = scene.constraints[k];
     if (!c.isTie()) continue;
     const RodRange &own = rods_[c.rod], &to = rods_[c.to_rod];
-    ties_.items.push_back({c.rod, own.slot(c.at), own.looseSlot() + free_slots[c.rod]++, to.first_vertex + c.to_vertex,
-                           to.slot(c.to_vertex), k});
+    ties_.items.push_back({c.rod, own.slot(c.at), own.looseSlot() + free_slots[c.rod]++, c.to_rod,
+                           to.first_vertex + c.to_vertex, to.slot(c.to_vertex), k});
     makeIsland(islands_[c.rod], islands_[c.to_rod]);
     joined_[c.rod] = joined_[c.to_rod] = true;
   }

@@ -139,7 +139,7 @@ void checkRod(const Rod &rod) {
          " degrees at a vertex; measure tan takes less than 180: use more edges, or measure angle");
 }
 
-DimensionlessGroups dimensionlessGroups(const Rod &rod, const Vec3 &gravity) {
+DimensionlessGroups dimensionlessGroups(const Rod &rod, const Vec3 &gravity, const std::vector<char> &corners) {
   DimensionlessGroups g{};
   for (int i = 0; i < rod.edges(); ++i) g.length += rod.edge(i).norm();
   const double ei = std::min(rod.material.flexural_stiffness[0], rod.material.flexural_stiffness[1]);
@@ -147,7 +147,7 @@ DimensionlessGroups dimensionlessGroups(const Rod &rod, const Vec3 &gravity) {
   g.axial_to_bending = rod.material.axial_stiffness * g.length * g.length / ei;
   for (int v = 0; v < rod.vertices(); ++v) {
     const int a = rod.edgeBefore(v), b = rod.edgeAfter(v);
-    if (a < 0 || b < 0) continue;
+    if (a < 0 || b < 0 || (!corners.empty() && corners[v])) continue;
     const Frame f0 = referenceFrame(rod, a), f1 = referenceFrame(rod, b);
     const double turning = std::acos(std::clamp(f0.tangent.dot(f1.tangent), -1.0, 1.0));
     g.largest_turning = std::max(g.largest_turning, degrees(turning));

@@ -100,10 +100,12 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
   PetscCall(PCFactorGetMatSolverType(pc, &type));
   const std::string chosen = type ? type : "";
   banded_ = cholesky && (chosen == "banded" || chosen == "condensed" || chosen == "woodbury");
-  PetscCheck(!banded_ || canFactor(chosen, dofs, set), PETSC_COMM_SELF, PETSC_ERR_SUP,
-             "option -pc_factor_mat_solver_type: %s cannot factor these rods: banded is for those that nothing joins, "
-             "condensed for junctions, woodbury for constraints between vertices; take %s or mumps",
-             type, ownSolver(dofs, set) ? ownSolver(dofs, set) : "petsc");
+  PetscCheck(
+      !banded_ || canFactor(chosen, dofs, set), PETSC_COMM_SELF, PETSC_ERR_SUP,
+      "option -pc_factor_mat_solver_type: %s cannot factor these rods: banded is for those that nothing joins, "
+      "condensed for junctions of open rods, woodbury for constraints between vertices of rods that suit one of both; "
+      "take %s or mumps",
+      type, ownSolver(dofs, set) ? ownSolver(dofs, set) : "petsc");
   if (banded_) // factored straight from the band; every other solver gets a matrix of PETSc's own
     PetscCall(createBandedMatrix(&system_, jacobian_.out()));
   else

@@ -9,21 +9,12 @@
 namespace tendril {
 namespace {
 
-/// The rod of a set at one of whose vertices a slot is.
-int rodAt(const DofMap &dofs, RodSet rods, int slot) {
-  const auto &all = dofs.rods();
-  return int(std::upper_bound(all.begin() + rods.begin, all.begin() + rods.end, slot,
-                              [](int s, const RodRange &rod) { return s < rod.first_slot; }) -
-             all.begin()) -
-         1;
-}
-
 /// Ties that the rod has that has most.
 int mostTies(const DofMap &dofs, RodSet rods) {
   std::unordered_map<int, int> count;
   int most = 0;
   for (const Tie &t : dofs.ties(rods))
-    for (const int r : {t.rod, rodAt(dofs, rods, t.of)}) most = std::max(most, ++count[r]);
+    for (const int r : {t.rod, t.to_rod}) most = std::max(most, ++count[r]);
   return most;
 }
 
@@ -41,13 +32,13 @@ WoodburyFactor::WoodburyFactor(const DofMap &dofs, RodSet rods, BandedWorkspace 
     const int tie = int(unknown_.size());
     auto &ends = unknown_.emplace_back();
     for (const int end : {0, 1}) {
-      const int slot = end == 0 ? t.slot : t.of;
+      const int slot = end == 0 ? t.slot : t.of, rod = end == 0 ? t.rod : t.to_rod;
       const auto found = first_slot.find(slot);
       for (int a = 0; a < 3; ++a) {
         const PetscInt u = dofs.unknown(found == first_slot.end() ? slot : found->second, a);
         ends[end][a] = u < 0 ? -1 : int(u - dofs.firstUnknown(rods));
       }
-      std::vector<Part> &group = groups_[separate ? rodAt(dofs, rods, slot) - rods.begin : 0];
+      std::vector<Part> &group = groups_[separate ? rod - rods.begin : 0];
       if (group.empty() || group.back().tie != tie) group.push_back({tie, {false, false}});
       group.back().has[end] = true;
     }
@@ -139,8 +130,8 @@ double WoodburyFactor::factorLifted(const BandedSystem &system) {
   stiffness /= 3 * double(ties.size());
   EdgeBlocks blocks = *system.blocks;
   for (const Tie &t : ties)
-    for (const int slot : {t.slot, t.of}) {
-      const RodRange &rod = dofs_.rods()[rodAt(dofs_, rods_, slot)];
+    for (const auto &[r, slot] : {std::pair(t.rod, t.slot), std::pair(t.to_rod, t.of)}) {
+      const RodRange &rod = dofs_.rods()[r];
       for (int a = 0; a < 3; ++a) blocks.entry(rod, EdgeBlocks::vertex(a, a))[slot - rod.first_slot] += stiffness;
     }
   BandedSystem lifted = system;

@@ -205,7 +205,7 @@ rows = [
     ("pin to a vertex that moves by itself", (support, support + "\nconstraints: [{type: pin, vertex: 4, to: {vertex: 1}, motion: {velocity: [1, 0, 0]}, stiffness: 1}]"), [], ["scene.yaml:9", "'motion' is for"]),
     ("misspelt vertex of the other end", (support, support + "\nconstraints: [{type: pin, vertex: 4, to: {vertx: 1}, stiffness: 1}]"), [], ["scene.yaml:9", "vertx"]),
     ("exact pin to a vertex", (support, support + "\nconstraints: [{type: pin, vertex: 4, to: {vertex: 1}}]"), [], ["scene.yaml:9", "'stiffness' is missing", "junction of 'type: ball'"]),
-    ("pin to a list", (support, support + "\nconstraints: [{type: pin, vertex: 4, to: [0, 1], stiffness: 1}]"), [], ["scene.yaml:9", "'to' must be a word"]),
+    ("pin to a list", (support, support + "\nconstraints: [{type: pin, vertex: 4, to: [0, 1], stiffness: 1}]"), [], ["scene.yaml:9", "'to' must be world, or a map"]),
     ("accuracy of rods that pins join", (support, support + "\nconstraints: [{type: pin, vertex: 4, to: {vertex: 1}, stiffness: 1}]"), ["-mode", "static", "-accuracy", "1e-3"], ["-accuracy", "join"]),
     ("rods that pins join, one by one", (support, support + "\nconstraints: [{type: pin, vertex: 4, to: {vertex: 1}, stiffness: 1}]"), ["-pc_factor_mat_solver_type", "banded"], ["-pc_factor_mat_solver_type", "woodbury"]),
     ("unknown key of a constraint", (support, support + "\nconstraints: [{type: pin, vertex: 4, stifness: 1}]"), [], ["scene.yaml:9", "stiffness"]),

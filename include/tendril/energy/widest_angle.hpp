@@ -6,7 +6,7 @@
 
 namespace tendril {
 
-/// The largest turning or twist between neighbouring edges. Cables do not count; rods of measure `angle`, for which it
+/// The largest turning or twist between neighbouring edges. Cables and corners in junctions do not count; rods of measure `angle`, for which it
 /// is no error, only when asked for.
 struct WidestAngle {
   double angle;             ///< [rad]

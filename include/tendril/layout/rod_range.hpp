@@ -72,7 +72,7 @@ struct JoinedEdge {
 /// matter of that rod alone. Its Hessian by the difference is where that of the copy would be.
 struct Tie {
   int rod, slot, copy;
-  int vertex, of; ///< the other one, over all rods, and its slot
+  int to_rod, vertex, of; ///< the other one's rod, number over all rods, and slot
   int constraint;
 };
 

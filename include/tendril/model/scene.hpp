@@ -188,6 +188,7 @@ struct DimensionlessGroups {
   double corner_softness;
   int softest_corner; ///< that vertex
 };
-DimensionlessGroups dimensionlessGroups(const Rod &rod, const Vec3 &gravity);
+/// \param corners by vertex, those that junctions keep: their turning is none of the rod's
+DimensionlessGroups dimensionlessGroups(const Rod &rod, const Vec3 &gravity, const std::vector<char> &corners = {});
 
 } // namespace tendril
