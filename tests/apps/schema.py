@@ -9,7 +9,6 @@ import copy
 import json
 import os
 import random
-import re
 import subprocess
 import sys
 import tempfile
@@ -24,15 +23,10 @@ except ImportError:
     sys.exit("schema.py needs python3-jsonschema: scripts/setup tests")
 
 program, root = os.path.abspath(sys.argv[1]), Path(sys.argv[2])
+sys.path.insert(0, str(root / "python"))
+from scene_yaml import Loader
+
 MUTATIONS = 200
-
-
-class Loader(yaml.SafeLoader):
-    """Numbers as YAML 1.2 has them, like the reader: 1e9 is one."""
-
-
-Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float", re.compile(r"^[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?$"), list("-+0123456789."))
 
 
 def spots(value, path=()):

@@ -1,5 +1,5 @@
 /// Pins between two vertices, against junctions and balances.
-#include "support/rods.hpp"
+#include "support/beams.hpp"
 
 #include "tendril/energy/derived.hpp"
 
@@ -11,14 +11,6 @@ Constraint tie(int rod, int vertex, int to_rod, int to_vertex, double stiffness)
   c.to_rod = to_rod;
   c.to_vertex = to_vertex;
   return c;
-}
-
-Rod beam(const Vec3 &from, const Vec3 &to, int edges, const std::string &name) {
-  Rod rod = inextensibleRod(lineShape(from, to, edges).points, Measure::angle);
-  rod.name = name;
-  rod.energy = Energy::classical;
-  rod.material.axial_stiffness = 1e4;
-  return rod;
 }
 
 /// Two beams of different lengths that cross in the middle, one of them under a load.

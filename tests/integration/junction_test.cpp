@@ -1,17 +1,13 @@
 /// Rods that junctions join, against the same thing without junctions and against closed forms.
+#include "support/beams.hpp"
 #include "support/random_cell.hpp"
-#include "support/rods.hpp"
 #include "tendril/dynamics/state_access.hpp"
 
 namespace tendril::test {
 namespace {
 
 Rod member(const Vec3 &from, const Vec3 &to, int edges, const std::string &name) {
-  Rod rod = inextensibleRod(lineShape(from, to, edges).points, Measure::angle);
-  rod.name = name;
-  rod.energy = Energy::classical;
-  rod.material.axial_stiffness = 1e5;
-  return rod;
+  return beam(from, to, edges, name, 1e5);
 }
 
 Junction join(std::vector<Junction::Member> members, bool rigid) {

@@ -153,4 +153,26 @@ inline int negativeByMumps(Mat matrix) {
   return int(minus);
 }
 
+/// That a factorisation solves as the dense matrix and counts negative pivots as MUMPS and the eigenvalues do, also
+/// when it is made again and where the solution takes the place of the right-hand side. \return whether it is
+/// indefinite
+template <class Factor> bool expectAsWhole(const Net &net, Factor &factor, double tolerance, int repeat) {
+  const Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(net.dense.rows(), -1, 2);
+  Eigen::VectorXd x(b.size());
+  for (int again = 0; again < 2; ++again) {
+    factor.factor(net.system);
+    factor.solve(b.data(), x.data());
+    EXPECT_LT((net.dense * x - b).norm(), tolerance * b.norm()) << repeat;
+  }
+  const int negative =
+      int((Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(net.dense).eigenvalues().array() < 0).count());
+  EXPECT_EQ(factor.negative(), negative) << repeat;
+  EXPECT_EQ(factor.zero(), 0) << repeat;
+  EXPECT_EQ(negativeByMumps(net.matrix), negative) << repeat;
+  x = b;
+  factor.solve(x.data(), x.data());
+  EXPECT_LT((net.dense * x - b).norm(), tolerance * b.norm()) << repeat;
+  return negative > 0;
+}
+
 } // namespace tendril::test

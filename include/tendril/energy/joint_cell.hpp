@@ -18,8 +18,11 @@ struct JointCellDerivatives {
 
 /// Frame as an edge of unit length: by its spin its tangent t moves by spin x t + spin x (spin x t)/2, and it twists by
 /// t.spin, up to third order. With T these first derivatives, g those of the energy by the vector of that edge and H
-/// its Hessian the Hessian by the spin is T'HT + (g t' + t g')/2 - (g.t) 1. \param cell the frame has no weight in its
-/// length \param frame whether the first or the second of the two is the frame: 0 or 1
+/// its Hessian the Hessian by the spin is T'HT + (g t' + t g')/2 - (g.t) 1.
+///
+/// \param cell the frame has no weight in its length
+///
+/// \param frame whether the first or the second of the two is the frame: 0 or 1
 template <Measure measure>
 JointCellDerivatives jointCellDerivatives(const Frame &f0, const Frame &f1, CellOf<double> cell, int frame) {
   CellDerivatives<double> d;

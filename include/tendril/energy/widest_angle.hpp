@@ -6,8 +6,8 @@
 
 namespace tendril {
 
-/// The largest turning or twist between neighbouring edges. Cables and corners in junctions do not count; rods of measure `angle`, for which it
-/// is no error, only when asked for.
+/// The largest turning or twist between neighbouring edges. Cables and corners in junctions do not
+/// count; rods of measure `angle`, for which it is no error, only when asked for.
 struct WidestAngle {
   double angle;             ///< [rad]
   int rod = -1, vertex = 0; ///< rod -1: nothing was wider than the angle that it began with

@@ -7,7 +7,7 @@
 
 namespace tendril {
 
-/// Open MPI starts a daemon and asks all networks for a process by itself, too: most of the time that a small run takes.
+/// Open MPI starts a daemon and asks all networks for a process by itself, too: most of the time of a small run.
 /// Without a launcher there is nobody to talk to, and this leaves both out. What the environment says already, stays.
 /// Call before PetscInitialize.
 inline void startAlone() {

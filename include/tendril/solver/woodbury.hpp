@@ -4,10 +4,9 @@
 /// junctions, have without it, K0, which keeps its own factorisation: with the capacitance D = H^-1 + C K0^-1 C',
 ///   (K0 + C' H C)^-1 b = K0^-1 (b - C' D^-1 C K0^-1 b)
 /// (Woodbury 1950), and the negative pivots of all are those of K0, and the positive ones of D less those of H
-/// (Haynsworth 1968). D has entries only between ties of the same rod; dense for few ties, by LAPACK, or sparse, as
-/// `condensed` has its Schur complement. Where K0 has pivots of zero, as that of a rod which only ties hold, springs
-/// from the tied vertices to the ground are added to K0 and taken off again by the update, of rank six a tie then.
-/// Registered with PETSc as the solver type `woodbury` for Cholesky.
+/// (Haynsworth 1968). D is dense, and factored with pivots by LAPACK. Where K0 has pivots of zero, as that of a rod
+/// which only ties hold, springs from the tied vertices to the ground are added to K0 and taken off again by the
+/// update, of rank six a tie then. Registered with PETSc as the solver type `woodbury` for Cholesky.
 
 #include "tendril/solver/condensed.hpp"
 
