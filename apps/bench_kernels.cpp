@@ -12,7 +12,7 @@
 ///   bench_kernels --benchmark_repetitions=5 --benchmark_out=kernels.json --benchmark_out_format=json
 #include "bench.hpp"
 
-#include "tendril/layout/alone.hpp"
+#include "tendril/layout/launch.hpp"
 #include "tendril/solver/events.hpp"
 
 #include <benchmark/benchmark.h>
@@ -289,7 +289,7 @@ void registerAll() {
 
 int main(int argc, char **argv) {
   benchmark::Initialize(&argc, argv); // takes its own options out
-  tendril::startAlone();
+  tendril::prepareMpi();
   if (PetscInitialize(&argc, &argv, nullptr, nullptr)) return 1;
   if (tendril::registerEvents() || tendril::registerSolvers()) return 1;
   tendril::bench::registerAll();

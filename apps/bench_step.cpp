@@ -14,7 +14,7 @@
 #include "bench.hpp"
 
 #include "tendril/io/options.hpp"
-#include "tendril/layout/alone.hpp"
+#include "tendril/layout/launch.hpp"
 #include "tendril/solver/events.hpp"
 
 #include <filesystem>
@@ -256,7 +256,7 @@ PetscErrorCode execute() {
 } // namespace tendril::bench
 
 int main(int argc, char **argv) {
-  tendril::startAlone();
+  tendril::prepareMpi();
   if (PetscInitialize(&argc, &argv, nullptr,
                       "bench_step: what whole Newton steps cost, without output (docs/performance.md).\n"))
     return 1;

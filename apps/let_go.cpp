@@ -9,7 +9,7 @@
 ///   let_go data/scenes/cantilever.yaml
 #include "tendril/dynamics/state_access.hpp"
 #include "tendril/io/scene_reader.hpp"
-#include "tendril/layout/alone.hpp"
+#include "tendril/layout/launch.hpp"
 #include "tendril/solver/events.hpp"
 
 #include <cstdio>
@@ -76,7 +76,7 @@ PetscErrorCode letGo(const char *file) {
 } // namespace
 
 int main(int argc, char **argv) {
-  tendril::startAlone();
+  tendril::prepareMpi();
   if (PetscInitialize(&argc, &argv, nullptr, nullptr)) return 1;
   int exit_code = 1;
   if (argc < 2)

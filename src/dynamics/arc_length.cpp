@@ -255,7 +255,7 @@ PetscErrorCode ArcLength::tryStep(const State &state, const Walk &walk, Tried *n
     // turn so sharp that the tangent behind it was taken for the reverse of the tangent before. Short steps tell.
     now->crossed = negative != negative_;
     const bool odd = (negative - negative_) % 2 != 0, turns = now->turns(walk);
-    const bool doubtful = odd != turns && potential.scene().moments.empty() && walk.length > walk.first / 16;
+    const bool doubtful = odd != turns && !potential.scene().hasCouples() && walk.length > walk.first / 16;
     astray_ = doubtful || product(walk.direction, now->end) < least_alignment;
     if (astray_) {
       now->converged = false;
@@ -347,8 +347,9 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     if (!now.converged) continue;
     potential.commit(state);
     EnergyBudget energy = energyOf(state);
-    Work work =
-        staticWork(potential.scene(), potential.elements(), now.start, state, potential.start(), potential.iterate());
+    WorkSums work;
+    addStaticWork(potential.scene(), potential.elements(), now.start, state, potential.start(), potential.iterate(),
+                  work);
     ++walk.taken;
     bool switched;
     PetscCall(passCritical(now, walk, state, finished, &switched));
@@ -357,9 +358,10 @@ PetscErrorCode ArcLength::run(State &state, const TimeLoop::Observer &observe, b
     if (switched) {
       PetscCall(tangent(&walk.direction));
       energy = energyOf(state);
-      work = staticWork(potential.scene(), potential.elements(), now.start, state);
+      work = {};
+      addStaticWork(potential.scene(), potential.elements(), now.start, state, work);
     }
-    Diagnostics row = rowOf(state, energy, work, &walk);
+    Diagnostics row = rowOf(state, energy, work.value(), &walk);
     PetscCall(PetscTime(&end));
     row.wall_seconds = end - begin;
     PetscCall(observe(state, row));

@@ -6,7 +6,7 @@
 
 namespace tendril {
 
-double distanceBetween(const State &a, const State &b) {
+double distanceBetween(const Team &team, const State &a, const State &b) {
   Vec3 low = a.position[0], high = low;
   double apart = 0;
   for (std::size_t v = 0; v < a.position.size(); ++v) {
@@ -14,6 +14,9 @@ double distanceBetween(const State &a, const State &b) {
     high = high.cwiseMax(a.position[v]);
     apart = std::max(apart, (a.position[v] - b.position[v]).norm());
   }
+  Tally tally;
+  for (int k = 0; k < 3; ++k) tally.smallest(low[k]).largest(high[k]);
+  team.combine(tally.largest(apart));
   return apart / (high - low).norm();
 }
 
@@ -147,13 +150,13 @@ PetscErrorCode criticalMode(StepSolver &solver, const CriticalPoint &point, Step
   PetscFunctionReturn(0);
 }
 
-bool areNear(const BranchPoint &a, const BranchPoint &b, double width) {
-  return distanceBetween(a.state, b.state) <= std::sqrt(std::abs(a.parameter - b.parameter) / width);
+bool areNear(const Team &team, const BranchPoint &a, const BranchPoint &b, double width) {
+  return distanceBetween(team, a.state, b.state) <= std::sqrt(std::abs(a.parameter - b.parameter) / width);
 }
 
 /// Bisection. Steps begin at `base`, the last point that is not within `aside` of the critical one, where the Hessian
 /// is nearly singular and Newton strays.
-static PetscErrorCode bisect(const Follow &follow, BranchPoint *low, BranchPoint *base, double high, double interval,
+static PetscErrorCode bisect(const Team &team, const Follow &follow, BranchPoint *low, BranchPoint *base, double high, double interval,
                              double aside, double width) {
   PetscFunctionBeginUser;
   *base = *low;
@@ -162,7 +165,7 @@ static PetscErrorCode bisect(const Follow &follow, BranchPoint *low, BranchPoint
     if (middle <= low->parameter || middle >= high) break;
     BranchPoint point;
     PetscCall(follow(*base, middle, &point));
-    auto goesOn = [&] { return point.found && areNear(*low, point, width); };
+    auto goesOn = [&] { return point.found && areNear(team, *low, point, width); };
     if (!goesOn() && base->parameter != low->parameter)
       PetscCall(follow(*low, middle, &point)); // towards a limit point, the nearest start is best
     // What cannot be found counts as beyond: past a limit point there is nothing near to converge to.
@@ -196,7 +199,7 @@ PetscErrorCode locateCritical(StepSolver &solver, const Step &step, const Follow
       high = end;
       return follow(low, end, &beyond);
     };
-    PetscCall(bisect(follow, &low, &base, high, interval * scale, aside, width));
+    PetscCall(bisect(solver.team(), follow, &low, &base, high, interval * scale, aside, width));
     if (std::abs(low.state.time - last) <= agreement * std::abs(last)) {
       if (low.parameter > known + agreement * std::abs(known))
         PetscCall(softens(solver, step, before, low, 3 * std::sqrt(interval * scale / aside),

@@ -8,7 +8,7 @@ namespace tendril {
 /// Whether to look also where Newton only met indefinite Hessians, and behind a critical point for more. It costs some
 /// solves of the step.
 bool TimeLoop::isThorough() const {
-  return settings_.bifurcation != Bifurcation::locate || solver_.potential().elements().edges() <= most_searched_edges;
+  return settings_.bifurcation != Bifurcation::locate || solver_.potential().scene().edges() <= most_searched_edges;
 }
 
 /// Stability may be lost within the step: finds where, as often as the way that the run takes loses it, and moves
@@ -80,7 +80,7 @@ PetscErrorCode TimeLoop::locateNext(const State &start, const Step &step, Critic
     if (!to->found) PetscFunctionReturn(0);
     PetscCall(countUnstable(solver_, &to->unstable));
     solver_.potential().commit(to->state);
-    to->found = to->unstable >= 0 && areNear(from, *to, width);
+    to->found = to->unstable >= 0 && areNear(solver_.team(), from, *to, width);
     PetscFunctionReturn(0);
   };
   BranchPoint low;
@@ -88,6 +88,18 @@ PetscErrorCode TimeLoop::locateNext(const State &start, const Step &step, Critic
   low.state = start;
   PetscCall(locateCritical(solver_, step, follow, low, step.time, std::abs(step.time), located_, point, found));
   PetscFunctionReturn(0);
+}
+
+static bool tryTogether(StepSolver &solver, const Planes &increment, double scale, Configuration &trial) {
+  return solver.team().all(solver.potential().tryMove(increment, scale, trial));
+}
+
+static double energyOfAll(const StepSolver &solver, const Configuration &c) {
+  ExactSum sum;
+  for (int r = 0; r < solver.potential().all().end; ++r) sum.add(solver.potential().energy(c, {r, r + 1}));
+  Tally tally;
+  solver.team().combine(tally.sum(sum));
+  return sum.value();
 }
 
 /// Displacements along the critical mode from which Newton begins a step: as long, and to the side, as lowers the
@@ -99,13 +111,13 @@ Guess TimeLoop::alongMode(const State &start, const Step &step) {
   double best = HUGE_VAL, best_scale = 0;
   for (double scale = 1e-6; scale < 2; scale *= 2)
     for (const double s : {scale, -scale}) {
-      const double energy = potential.tryMove(*mode_, s, trial) ? potential.energy(trial) : HUGE_VAL;
+      const double energy = tryTogether(solver_, *mode_, s, trial) ? energyOfAll(solver_, trial) : HUGE_VAL;
       if (!(energy < best) || best - energy < 1e-12 * std::abs(energy)) continue; // the first of two that are alike
       best = energy;
       best_scale = s;
     }
   Guess guess{potential.dofs().makePlanes(), {}};
-  if (!potential.tryMove(*mode_, best_scale, trial)) return guess;
+  if (!tryTogether(solver_, *mode_, best_scale, trial)) return guess;
   potential.accept(trial);
   potential.coordinates(guess.unknowns);
   return guess;

@@ -232,7 +232,7 @@ PetscErrorCode ArcLength::passCritical(const Tried &now, const Walk &walk, State
   std::vector<CriticalPoint> critical;
   if (now.turns(walk))
     PetscCall(locateLimit(now.start, now.before, {walk.direction.factor, now.end.factor}, walk.length, &critical));
-  else if (now.crossed && solver_.potential().scene().moments.empty())
+  else if (now.crossed && !solver_.potential().scene().hasCouples())
     PetscCall(locateBifurcation(now.start, state, now.before, walk.length, &critical));
   if (settings_.bifurcation != Bifurcation::locate && critical.size() > 1)
     critical.resize(1); // the run goes no further this way

@@ -51,14 +51,18 @@ PetscErrorCode TimeLoop::solveStages(const State &start, State *next, Attempt *n
       rates.strains = strainsOf(potential.scene(), potential.elements(), potential.iterate());
   }
   if (integrator_->endsAtStage()) PetscFunctionReturn(0);
-  if (!potential.moveOn(now->step.time, integrator_->end(start, h, stages_))) {
+  const bool possible = potential.moveOn(now->step.time, integrator_->end(start, h, stages_));
+  if (solver_.team().any(!possible)) {
     now->report.converged = false;
+    const std::string near = possible ? "" : nearObstacle(potential, potential.all());
     now->report.reason = "the end of the step, beyond its last stage, is not a possible configuration" +
-                         nearObstacle(potential, potential.all());
+                         solver_.team().textOfFirst(near.empty() ? HUGE_VAL : solver_.team().rank(), near);
     PetscFunctionReturn(0);
   }
-  finish(start, h, potential.all(), next);
-  now->commit(potential, potential.all(), next);
+  for (const NewtonSolver &block : solver_.blocks()) {
+    finish(start, h, block.rods(), next);
+    now->commit(potential, block.rods(), next);
+  }
   PetscFunctionReturn(0);
 }
 
@@ -97,11 +101,11 @@ void TimeLoop::noteActions(RodSet rods) {
 
 /// Of the step just solved, without what the inertia of held vertices takes. Weights of what is not remembered are
 /// those of the last stage.
-Work TimeLoop::dynamicWork(const State &start, double h) const {
+void TimeLoop::addDynamicWork(const State &start, double h, WorkSums &work) const {
   const IncrementalPotential &potential = solver_.potential();
   const Scene &scene = potential.scene();
-  Work work{workOfLoads(scene, potential.elements(), potential.start(), potential.iterate(), 1, 1), 0};
-  if (moving_.empty()) return work;
+  addWorkOfLoads(scene, potential.elements(), potential.start(), potential.iterate(), 1, 1, work.loads);
+  if (moving_.empty()) return;
   const std::vector<double> weights = integrator_->forceWeights(start, h, actions_.size());
   const std::size_t n = actions_.back().size(),
                     remembered = start.support_actions.size() % n == 0 ? start.support_actions.size() : 0;
@@ -116,23 +120,20 @@ Work TimeLoop::dynamicWork(const State &start, double h) const {
     return sum;
   };
   for (std::size_t k = 0; k < moving_.size(); ++k)
-    (moving_[k].collider ? work.obstacles : work.supports) +=
-        workOf(moving_[k], {mean(2 * k), mean(2 * k + 1)}, potential.elements(), potential.start(), potential.iterate(),
-               start.time, potential.step().time);
-  return work;
+    (moving_[k].collider ? work.obstacles : work.supports)
+        .add(workOf(moving_[k], {mean(2 * k), mean(2 * k + 1)}, potential.elements(), potential.start(),
+                    potential.iterate(), start.time, potential.step().time));
 }
 
 /// Kinetic energy of the vertices that moving supports hold [J].
-double TimeLoop::movedKinetic(const State &state) const {
+void TimeLoop::addHeldEnergy(const State &state, ExactSum &sum) const {
   const IncrementalPotential &potential = solver_.potential();
-  double sum = 0;
   for (const Holder &h : moving_) {
     const RodRange &rod = potential.elements().rods[h.rod];
     if (h.support && h.support->holdsPosition())
-      sum += 0.5 * massWithSame(potential.elements(), h.rod, h.support->vertex) *
-             state.velocity[rod.first_vertex + h.support->vertex].squaredNorm();
+      sum.add(0.5 * massWithSame(potential.elements(), h.rod, h.support->vertex) *
+              state.velocity[rod.first_vertex + h.support->vertex].squaredNorm());
   }
-  return sum;
 }
 
 /// What the state at the end of the step remembers of strains, actions and the length of the step.

@@ -20,6 +20,12 @@ Step TimeLoop::stepOf(const LoopSettings &settings, const State &state, double d
   return step;
 }
 
+void StepControl::share(const Team &team) {
+  double numbers[] = {dt, double(good), double(stable), error, error_sum, rounding_sum, energy};
+  team.share(numbers);
+  *this = {numbers[0], int(numbers[1]), numbers[2] != 0, numbers[3], numbers[4], numbers[5], numbers[6]};
+}
+
 /// Length of the next step [s]: no sliver is left before a time at which a step has to end.
 double TimeLoop::nextStep(double time, double *landing) const {
   *landing = settings_.t_end;
@@ -63,12 +69,13 @@ double TimeLoop::shortest() const { return settings_.dt_min > 0 ? settings_.dt_m
 /// Solves the step. What it leads to is in `next`, block by block where the last stage is the end of the step; the
 /// state is not touched.
 PetscErrorCode TimeLoop::attempt(const State &state, State *next, Attempt *now) {
-  const IncrementalPotential &potential = solver_.potential();
   PetscFunctionBeginUser;
   if (settings_.dynamic) {
     PetscCall(solveStages(state, next, now));
-    if (now->report.converged && (adapts() || settings_.estimate_error)) now->error = stepError(state, now->h);
-    now->too_coarse = now->report.converged && adapts() && !adapt(now->h, shortest(), now->error);
+    if (!now->report.converged) PetscFunctionReturn(0);
+    next->time = now->step.time;
+    measure(state, *next, now);
+    now->too_coarse = adapts() && !adapt(now->h, shortest(), now->error);
     PetscFunctionReturn(0);
   }
   solver_.on_block = [&](RodSet rods) { now->commit(solver_.potential(), rods, next); };
@@ -78,18 +85,39 @@ PetscErrorCode TimeLoop::attempt(const State &state, State *next, Attempt *now) 
   solver_.on_block = nullptr;
   next->time = now->step.time;
   if (!now->report.converged) PetscFunctionReturn(0);
-  // Here, for a search for critical points within the step moves the iterate.
-  now->work = staticWork(potential.scene(), potential.elements(), state, *next, potential.start(), potential.iterate());
-  for (const Holder &h : moving_)
-    if (h.collider)
-      now->work.obstacles += workOf(h, solver_.potential().actionOf(h), potential.elements(), potential.start(),
-                                    potential.iterate(), state.time, next->time);
+  measure(state, *next, now); // here, for a search for critical points within the step moves the iterate
   PetscFunctionReturn(0);
+}
+
+/// What rods of all ranks add to what is told of a step that has converged, by one reduction.
+void TimeLoop::measure(const State &state, const State &next, Attempt *now) {
+  const IncrementalPotential &potential = solver_.potential();
+  const Scene &scene = potential.scene();
+  if (settings_.dynamic) {
+    if (adapts() || settings_.estimate_error) now->error = stepError(state, now->h);
+    addDynamicWork(state, now->h, now->work);
+    addHeldEnergy(state, now->held_before);
+    addHeldEnergy(next, now->held_after);
+    addCarriedEnergy(scene, potential.elements(), next, now->carried);
+  } else {
+    addStaticWork(scene, potential.elements(), state, next, potential.start(), potential.iterate(), now->work);
+    for (const Holder &h : moving_)
+      if (h.collider)
+        now->work.obstacles.add(workOf(h, solver_.potential().actionOf(h), potential.elements(), potential.start(),
+                                       potential.iterate(), state.time, next.time));
+  }
+  now->stops = stops && stops();
+  Tally tally;
+  for (ExactSum &energy : now->energy.sums) tally.sum(energy);
+  now->work.tally(tally);
+  tally.sum(now->held_before).sum(now->held_after).sum(now->carried).smallest(now->gap).any(now->stops);
+  tally.largest(now->error.error).largest(now->error.moved);
+  solver_.team().combine(tally);
 }
 
 void TimeLoop::Attempt::commit(const IncrementalPotential &potential, RodSet rods, State *next) {
   potential.commitConfiguration(*next, rods);
-  energy += potential.energyBudget(*next, potential.iterate(), step.load_factor, rods);
+  energy.add(potential.energyBudget(*next, potential.iterate(), step.load_factor, rods));
   gap = std::min(gap, potential.smallestGap(rods));
 }
 
@@ -97,26 +125,21 @@ void TimeLoop::Attempt::commit(const IncrementalPotential &potential, RodSet rod
 /// nothing about stability. What friction holds begins free, which is no critical point either.
 bool TimeLoop::mayPassCritical(const State &state, const NewtonReport &report) const {
   return !settings_.dynamic && settings_.bifurcation != Bifurcation::off &&
-         solver_.potential().scene().moments.empty() && !solver_.potential().scene().slides() && control.stable &&
+         !solver_.potential().scene().hasCouples() && !solver_.potential().scene().slides() && control.stable &&
          located_ <= state.time && (report.first_negative_pivots > 0 || (isThorough() && report.mayPassCritical()));
 }
 
 /// Makes the answer of a step the state. Work since the last row adds to `work`.
 void TimeLoop::accept(State &state, State &next, Attempt *now, Work *work) {
   mode_.reset();
-  if (settings_.dynamic) {
-    *work = dynamicWork(state, now->h);
-    work->supports -= movedKinetic(state);
-  }
-  next.time = now->step.time;
+  *work += now->work.value();
+  work->supports += now->held_after.value() - now->held_before.value();
   next.step = state.step + 1;
   if (settings_.dynamic) {
     remember(state, now->h, &next);
     control.error_sum += now->error.error;
-  } else
-    *work += now->work;
+  }
   std::swap(state, next);
-  if (settings_.dynamic) work->supports += movedKinetic(state);
   control.stable = now->report.negative_pivots == 0;
   control.rounding_sum =
       settings_.dynamic ? control.rounding_sum + now->report.rounding_error : now->report.rounding_error;
@@ -151,11 +174,12 @@ Diagnostics TimeLoop::rowOf(const State &state, const Attempt &now, const Work &
   Diagnostics row;
   row.time = state.time;
   row.dt = now.h;
-  row.energy = now.energy;
+  row.energy = now.energy.value();
+  row.carried = now.carried.value();
   row.contact_gap_min = now.gap;
   row.work = work;
-  row.dissipated = control.energy + work.total() - now.energy.total();
-  control.energy = now.energy.total();
+  row.dissipated = control.energy + work.total() - row.energy.total();
+  control.energy = row.energy.total();
   row.newton_iterations = now.report.iterations;
   row.line_search_trials = now.report.trials;
   row.negative_pivots = now.report.negative_pivots;
@@ -172,7 +196,13 @@ void TimeLoop::prepare(const State &state) {
   const bool goes_on = !std::isnan(control.energy) && (settings_.dynamic || state.time > 0);
   if (!goes_on) {
     const Configuration start = configurationOf(state, scene, potential.elements(), state.time);
-    control.energy = potential.energyBudget(state, start, settings_.dynamic ? 1 : state.time, potential.all()).total();
+    EnergySums energy;
+    for (const NewtonSolver &block : solver_.blocks())
+      energy.add(potential.energyBudget(state, start, settings_.dynamic ? 1 : state.time, block.rods()));
+    Tally tally;
+    for (ExactSum &sum : energy.sums) tally.sum(sum);
+    solver_.team().combine(tally);
+    control.energy = energy.value().total();
   }
   moving_ = movingHolders(scene);
   const std::vector<Holder> obstacles = movingObstacles(scene);
@@ -212,7 +242,12 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
       *finished = moved && settings_.bifurcation == Bifurcation::stop;
       if (*finished) PetscFunctionReturn(0);
       if (moved) {
-        work += staticWork(solver_.potential().scene(), solver_.potential().elements(), before, state);
+        WorkSums way;
+        addStaticWork(solver_.potential().scene(), solver_.potential().elements(), before, state, way);
+        Tally tally;
+        way.tally(tally);
+        solver_.team().combine(tally);
+        work += way.value();
         next = state;
         control.stable = false;
         continue;
@@ -232,7 +267,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     PetscCall(PetscTime(&now));
     row.wall_seconds = now - begin;
     PetscCall(observe(state, row));
-    if (stops && state.time < settings_.t_end && stops()) PetscFunctionReturn(0);
+    if (step.stops && state.time < settings_.t_end) PetscFunctionReturn(0);
   }
   *finished = true;
   PetscFunctionReturn(0);

@@ -5,17 +5,15 @@
 namespace tendril {
 namespace {
 
-/// Potential of the weight and of centrifugal forces at load factor 1 [J].
-double weightPotential(const Scene &scene, const Elements &elements, const Configuration &c) {
+/// Potential of the weight of a rod and of centrifugal forces at load factor 1 [J].
+double weightPotential(const Scene &scene, const Elements &elements, const Configuration &c, int r) {
   const Mat3 spin = scene.rotation.matrix();
+  const RodRange &rod = elements.rods[r];
+  const Vec3 gravity = scene.rods[r].gravity ? scene.gravity : Vec3(Vec3::Zero());
   double sum = 0;
-  for (std::size_t r = 0; r < scene.rods.size(); ++r) {
-    const RodRange &rod = elements.rods[r];
-    const Vec3 gravity = scene.rods[r].gravity ? scene.gravity : Vec3(Vec3::Zero());
-    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) {
-      const Vec3 x = c.positionAt(s), away = x - scene.rotation.centre;
-      sum -= elements.mass()[s] * (gravity.dot(x) + 0.5 * away.dot(spin * away));
-    }
+  for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) {
+    const Vec3 x = c.positionAt(s), away = x - scene.rotation.centre;
+    sum -= elements.mass()[s] * (gravity.dot(x) + 0.5 * away.dot(spin * away));
   }
   return sum;
 }
@@ -41,30 +39,30 @@ double coupleWork(const Vec3 &moment, double torque, const Vec3 &from, const Vec
   return (torque + moment.dot(mean)) * spin + turning * moment.dot(axis);
 }
 
-double workOfLoads(const Scene &scene, const Elements &elements, const Configuration &start, const Configuration &end,
-                   double factor_start, double factor_end) {
+void addWorkOfLoads(const Scene &scene, const Elements &elements, const Configuration &start, const Configuration &end,
+                    double factor_start, double factor_end, ExactSum &sum) {
   const double mean = 0.5 * (factor_start + factor_end);
-  double sum = 0;
   for (const NodalForce &f : scene.forces)
-    sum += mean * f.force.dot(end.displacementAt(elements.rods[f.rod].slot(f.vertex), start));
+    sum.add(mean * f.force.dot(end.displacementAt(elements.rods[f.rod].slot(f.vertex), start)));
   for (const EdgeMoment &m : scene.moments) {
     const int slot = elements.rods[m.rod].slot(m.edge);
     const Frame before = start.frameAt(slot), after = end.frameAt(slot);
     const double principal = halfAngleBetween(before, after).angle(),
                  spun = end[Configuration::spin][slot] - start[Configuration::spin][slot];
-    sum += mean * coupleWork(m.moment, m.torque, before.tangent, after.tangent,
-                             principal + 2 * pi * std::round((spun - principal) / (2 * pi)));
+    sum.add(mean * coupleWork(m.moment, m.torque, before.tangent, after.tangent,
+                              principal + 2 * pi * std::round((spun - principal) / (2 * pi))));
   }
   if (!scene.moments
            .empty()) // an end couple turns the half edge beyond the last cell, too, and what it does there is stored
     for (const auto &couples : elements.end_couples)
       for (const EndCouple &couple : couples)
         for (int k = 0; k < 3; ++k)
-          sum += endEnergy(elements, end, couple, factor_end)[k] - endEnergy(elements, start, couple, factor_start)[k];
-  if (factor_end != factor_start)
-    sum += 0.5 * (factor_end - factor_start) *
-           (weightPotential(scene, elements, start) + weightPotential(scene, elements, end));
-  return sum;
+          sum.add(endEnergy(elements, end, couple, factor_end)[k] -
+                  endEnergy(elements, start, couple, factor_start)[k]);
+  if (factor_end == factor_start) return;
+  for (int r = 0; r < int(scene.rods.size()); ++r)
+    sum.add(0.5 * (factor_end - factor_start) *
+            (weightPotential(scene, elements, start, r) + weightPotential(scene, elements, end, r)));
 }
 
 std::vector<Holder> movingHolders(const Scene &scene) {
@@ -94,22 +92,46 @@ double workOf(const Holder &holder, const std::array<Vec3, 2> &action, const Ele
   return action[0].dot(moved) + action[1].dot(motion.turnBetween(from, to));
 }
 
-Work staticWork(const Scene &scene, const Elements &elements, const State &before, const State &after,
-                const Configuration &start, const Configuration &end) {
-  Work work{workOfLoads(scene, elements, start, end, before.time, after.time), 0};
+void addStaticWork(const Scene &scene, const Elements &elements, const State &before, const State &after,
+                   const Configuration &start, const Configuration &end, WorkSums &work) {
+  addWorkOfLoads(scene, elements, start, end, before.time, after.time, work.loads);
   const std::vector<Holder> moving = movingHolders(scene);
-  if (moving.empty()) return work;
+  if (moving.empty()) return;
   const HolderActions first = staticActions(scene, elements, before, moving),
                       last = staticActions(scene, elements, after, moving);
   auto mean = [&](std::size_t k) { return Vec3(0.5 * (first[k] + last[k])); };
   for (std::size_t k = 0; k < moving.size(); ++k)
-    work.supports += workOf(moving[k], {mean(2 * k), mean(2 * k + 1)}, elements, start, end, before.time, after.time);
-  return work;
+    work.supports.add(
+        workOf(moving[k], {mean(2 * k), mean(2 * k + 1)}, elements, start, end, before.time, after.time));
 }
 
-Work staticWork(const Scene &scene, const Elements &elements, const State &before, const State &after) {
-  return staticWork(scene, elements, before, after, configurationOf(before, scene, elements, before.time),
-                    configurationOf(after, scene, elements, after.time));
+void addStaticWork(const Scene &scene, const Elements &elements, const State &before, const State &after,
+                   WorkSums &work) {
+  addStaticWork(scene, elements, before, after, configurationOf(before, scene, elements, before.time),
+                configurationOf(after, scene, elements, after.time), work);
+}
+
+void addCarriedEnergy(const Scene &scene, const Elements &elements, const State &state, ExactSum &sum) {
+  struct Carried {
+    Vec3 about, velocity, spin;
+  };
+  std::vector<Carried> moving;
+  for (const Collider &c : scene.colliders)
+    if (c.motion.moves())
+      moving.push_back(
+          {c.poseAt(state.time).position, c.motion.velocityAt(state.time), c.motion.angularVelocityAt(state.time)});
+  if (moving.empty()) return;
+  for (const RodRange &rod : elements.rods) {
+    double carried = 0;
+    for (int i = 0; i < rod.vertices; ++i) {
+      const Vec3 &x = state.position[rod.first_vertex + i], &v = state.velocity[rod.first_vertex + i];
+      double least = v.squaredNorm();
+      for (const Carried &c : moving)
+        least = std::min(least, (v - c.velocity - c.spin.cross(x - c.about)).squaredNorm());
+      carried += 0.5 * elements.mass()[rod.slot(i)] * (v.squaredNorm() - least);
+    }
+    sum.add(carried);
+  }
 }
 
 } // namespace tendril

@@ -216,15 +216,17 @@ void readTime(Texts &texts, Options *o) {
   if (texts.has("-dt_adapt")) o->dynamic_only = "dt_adapt"; // -integrator may stay in statics, in sweeps over both
 }
 
+int placeOf(const std::string &word, const auto &words) {
+  return int(std::find(words.begin(), words.end(), word) - words.begin());
+}
+
 void readStatics(Texts &texts, Options *o) {
   if (texts.has("-load_steps")) o->given_load_steps = texts.integer("-load_steps");
   if (texts.has("-arclength_steps")) o->arclength_steps = texts.integer("-arclength_steps");
   o->loop.arclength_steps = texts.integer("-arclength_steps");
   o->loop.continuation = texts.word("-continuation") == "load" ? Continuation::load : Continuation::arclength;
   if (texts.has("-continuation")) o->continuation = o->loop.continuation;
-  const std::string bifurcation = texts.word("-bifurcation");
-  o->loop.bifurcation =
-      Bifurcation(std::find(bifurcations.begin(), bifurcations.end(), bifurcation) - bifurcations.begin());
+  o->loop.bifurcation = Bifurcation(placeOf(texts.word("-bifurcation"), bifurcations));
   if (texts.has("-bifurcation")) o->bifurcation = o->loop.bifurcation;
 }
 
@@ -255,6 +257,7 @@ void readSolver(Texts &texts, Options *o) {
                               : search == "residual" ? LineSearchKind::residual
                                                      : LineSearchKind::energy;
   o->loop.solve.quasi_newton = texts.integer("-quasi_newton");
+  o->partition = PartitionKind(placeOf(texts.word("-partition"), partitions));
   o->loop.mixed = texts.word("-stretch") == "mixed";
   o->loop.hessian = texts.word("-hessian") == "exact" ? HessianKind::exact : HessianKind::gauss_newton;
 }

@@ -84,6 +84,7 @@ private:
 
   void putSolver() {
     put("rounding_tolerance", o.loop.solve.rounding_tolerance);
+    put("partition", std::string(partitions[int(o.partition)]));
     constexpr const char *searches[] = {"energy", "wolfe", "residual"};
     put("line_search", searches[int(o.loop.solve.line_search)]);
     put("quasi_newton", o.loop.solve.quasi_newton);

@@ -2,6 +2,7 @@
 
 #include "tendril/contact/contact.hpp"
 #include "tendril/dynamics/arc_length.hpp"
+#include "tendril/io/quiet_errors.hpp"
 #include "tendril/io/text.hpp"
 #include "tendril/solver/activity.hpp"
 #include "tendril/solver/events.hpp"
@@ -98,13 +99,48 @@ void refuseWithObstacles(const Options &o) {
                    (arc ? "take load steps" : "compare runs with -rod_edges, and with other values of -dt"));
 }
 
-PetscErrorCode makeReady(Scene scene, const Options &o, std::unique_ptr<Simulation> &run) {
-  PetscFunctionBeginUser;
-  run = std::make_unique<Simulation>();
-  PetscCall(run->setUp(std::move(scene), o.loop));
-  if (!run->scene.colliders.empty() && o.restart.empty()) refuseOverlaps(*run);
-  PetscCall(run->solver.rehearse(run->state, TimeLoop::stepOf(o.loop, run->state, o.loop.dt)));
-  PetscFunctionReturn(0);
+/// What PETSc finds wrong is a mistake in the options of its solvers.
+void guarded(const std::function<PetscErrorCode()> &work) {
+  const QuietErrors errors;
+  if (work()) throw SceneError("setting up the solvers: " + errors.message());
+}
+
+/// A path of equilibria has one load factor for all rods, which makes them one island.
+void makeReady(Scene scene, const Options &o, Prepared &prepared) {
+  const Team world = Team::world();
+  const bool path = !o.loop.dynamic && o.loop.continuation == Continuation::arclength;
+  const Partition parts = partition(scene, path ? 1 : world.size(), o.partition);
+  prepared.team = world.first(parts.ranks);
+  if (world.size() > 1) {
+    const std::vector<std::string> lines = describe(parts, scene, world.size());
+    if (!path) prepared.notes.insert(prepared.notes.end(), lines.begin(), lines.end());
+    if (path)
+      prepared.notes.push_back("warning: with -continuation arclength all rods share one load factor and run on one "
+                               "rank; the other " +
+                               std::to_string(world.size() - 1) + " have nothing to do");
+  }
+  if (prepared.team.isEmpty()) return;
+  const Team &team = prepared.team;
+  prepared.slice = Slice(scene, parts, team);
+  prepared.described.reset();
+  Simulation &run = *(prepared.run = std::make_unique<Simulation>());
+  if (prepared.slice.isAll())
+    guarded([&] { return run.setUp(std::move(scene), o.loop); });
+  else {
+    Share share{team, parts.blocksOf(team.rank()), parts.placesOf(team.rank())};
+    guarded([&] { return run.prepare(prepared.slice.sceneOf(scene), o.loop, team); });
+    team.together([&] {
+      guarded([&] { return run.setUpSolver(o.loop, share); });
+      if (!team.leads()) return;
+      prepared.described = std::make_unique<Simulation>();
+      prepared.described->describe(std::move(scene), o.loop.dynamic);
+    });
+  }
+  team.together([&] {
+    if (team.leads() && !prepared.whole().scene.colliders.empty() && o.restart.empty())
+      refuseOverlaps(prepared.whole());
+    guarded([&] { return run.solver.rehearse(run.state, TimeLoop::stepOf(o.loop, run.state, o.loop.dt)); });
+  });
 }
 
 void remeshAsAsked(SceneFile &file, const Options &o) {
@@ -118,9 +154,8 @@ void remeshAsAsked(SceneFile &file, const Options &o) {
 
 } // namespace
 
-PetscErrorCode prepare(Prepared &prepared, Options &o) {
-  PetscFunctionBeginUser;
-  PetscCall(PetscLogStagePush(events().setup));
+/// The scene as it will run, checked against the options.
+static Scene sceneFor(Prepared &prepared, Options &o) {
   SceneFile file = readScene(o.scene, o.overrides);
   prepared.source = std::move(file.source);
   prepared.notes = std::move(file.notes);
@@ -155,26 +190,43 @@ PetscErrorCode prepare(Prepared &prepared, Options &o) {
     if (o.accuracy) grade(prepared.written, prepared.drawings);
   }
   if (!o.rod_edges.empty()) remeshAsAsked(file, o);
-  PetscCall(makeReady(std::move(file.scene), o, prepared.run));
-  for (std::string &note : notesOnContact(*prepared.run)) prepared.notes.push_back(std::move(note));
-  PetscCall(PetscLogStagePop());
-  PetscFunctionReturn(0);
+  return std::move(file.scene);
 }
 
-PetscErrorCode meetAccuracy(Prepared &prepared, Options &o, Choice *choice) {
-  PetscFunctionBeginUser;
-  watch().tell = [](const std::string &line) {
-    std::printf("%s\n", printable(line).c_str());
-    std::fflush(stdout);
-  };
-  choice->tell = [](const std::string &line) {
-    watch().tell(line);
-    watch().restart();
-  };
-  PetscCall(chooseResolution(prepared.written, prepared.drawings, o.loop, *o.accuracy, choice));
-  o.loop = choice->loop;
-  PetscCall(makeReady(remesh(prepared.written, prepared.drawings, choice->edges), o, prepared.run));
-  PetscFunctionReturn(0);
+void prepare(Prepared &prepared, Options &o) {
+  (void)PetscLogStagePush(events().setup);
+  Scene scene;
+  Team::world().together([&] { scene = sceneFor(prepared, o); });
+  makeReady(std::move(scene), o, prepared);
+  if (prepared.team.leads() && !prepared.team.isEmpty())
+    for (std::string &note : notesOnContact(prepared.whole())) prepared.notes.push_back(std::move(note));
+  (void)PetscLogStagePop();
+}
+
+void meetAccuracy(Prepared &prepared, Options &o, Choice *choice) {
+  const Team world = Team::world();
+  world.together([&] { // by one rank: its runs are small, and many are alike
+    if (!world.leads()) return;
+    watch().tell = [](const std::string &line) {
+      std::printf("%s\n", printable(line).c_str());
+      std::fflush(stdout);
+    };
+    choice->tell = [](const std::string &line) {
+      watch().tell(line);
+      watch().restart();
+    };
+    guarded([&] { return chooseResolution(prepared.written, prepared.drawings, o.loop, *o.accuracy, choice); });
+    o.loop = choice->loop;
+  });
+  double steps[] = {o.loop.dt, o.loop.dt_rtol, o.loop.dt_atol};
+  world.share(steps);
+  world.shareList(choice->edges);
+  o.loop.dt = steps[0];
+  o.loop.dt_rtol = steps[1];
+  o.loop.dt_atol = steps[2];
+  const std::vector<std::string> notes = prepared.notes;
+  makeReady(remesh(prepared.written, prepared.drawings, choice->edges), o, prepared);
+  prepared.notes.insert(prepared.notes.begin(), notes.begin(), notes.end());
 }
 
 } // namespace tendril

@@ -1,6 +1,7 @@
 #include "tendril/io/progress.hpp"
 
 #include "tendril/io/text.hpp"
+#include "tendril/layout/launch.hpp"
 #include "tendril/solver/activity.hpp"
 
 #include <sys/ioctl.h>
@@ -20,18 +21,21 @@ std::string fitted(const std::string &line) {
 
 } // namespace
 
-Progress::Progress(const LoopSettings &loop, const std::string &log_path)
+Progress::Progress(const LoopSettings &loop, const std::string &log_path, bool speaks)
     : end_(loop.t_end), time_(loop.dynamic ? "time" : "load factor"),
       step_(loop.dynamic                                   ? "dt"
             : loop.continuation == Continuation::arclength ? "length"
                                                            : "increment"),
-      terminal_(isatty(STDOUT_FILENO)), log_(std::fopen(log_path.c_str(), "w")) {
+      terminal_(isatty(STDOUT_FILENO) && !isLaunched()) { // Open MPI pretends to be one
+  if (!speaks) return;
+  log_ = std::fopen(log_path.c_str(), "w");
   if (!log_) throw SceneError(log_path + ": cannot be written; choose another folder with -output_dir");
   watch().restart();
   watch().tell = [this](const std::string &line) { tell(printable(line), terminal_, true); };
 }
 
 Progress::~Progress() {
+  if (!log_) return;
   watch().tell = nullptr;
   endLine();
   std::fclose(log_);
@@ -56,6 +60,7 @@ void Progress::tell(const std::string &line, bool rewrites, bool logs) {
 }
 
 void Progress::say(const std::string &line) {
+  if (!log_) return;
   endLine();
   std::printf("%s\n", printable(line).c_str());
   std::fflush(stdout);
@@ -64,11 +69,13 @@ void Progress::say(const std::string &line) {
 }
 
 void Progress::log(const std::string &line) {
+  if (!log_) return;
   std::fprintf(log_, "%s\n", printable(line).c_str());
   std::fflush(log_);
 }
 
 void Progress::fail(const std::string &why) {
+  if (!log_) return;
   endLine();
   std::fflush(stdout);
   log("failed: " + why);
@@ -76,6 +83,7 @@ void Progress::fail(const std::string &why) {
 }
 
 void Progress::step(const Diagnostics &row) {
+  if (!log_) return;
   watch().restart();
   const double done = row.time / end_;
   const bool report = done >= next_report_ || row.rejected_steps > 0;

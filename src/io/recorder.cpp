@@ -9,48 +9,27 @@
 
 namespace tendril {
 
-Recorder::Recorder(const Options &options, const Simulation &run, const StepControl &control, const RunFacts &facts,
+Recorder::Recorder(const Options &options, const Prepared &prepared, const StepControl &control, const RunFacts &facts,
                    const Provenance &origin, Progress &progress)
-    : options_(options), run_(run), control_(control), facts_(facts), progress_(progress),
-      trajectory_(std::make_unique<TrajectoryWriter>(options.output_dir, run.scene, *run.elements, origin,
-                                                     options.fields, options.loop.dynamic)),
-      checkpoint_(options.output_dir + "/checkpoint.h5"),
+    : options_(options), prepared_(prepared), run_(prepared.whole()), control_(control), facts_(facts),
+      progress_(progress), checkpoint_(options.output_dir + "/checkpoint.h5"),
       arclength_(!options.loop.dynamic && options.loop.continuation == Continuation::arclength), widest_{pi / 6} {
-  trajectory_->writeFrame(run.state);
-  trajectory_->flushWhenDue();
   if (const double interval = options.output_interval; interval > 0)
-    next_output_ = interval * (1 + std::floor(run.state.time / interval * (1 + 1e-12)));
-  widest_.include(run.scene, *run.elements, run.state); // told at the start
-  widest_.rod = -1;
+    next_output_ = interval * (1 + std::floor(run_.state.time / interval * (1 + 1e-12)));
+  if (leads())
+    trajectory_ = std::make_unique<TrajectoryWriter>(options.output_dir, run_.scene, *run_.elements, origin,
+                                                     options.fields, options.loop.dynamic);
+  writeFrame(run_.state);
+  if (leads()) trajectory_->flushWhenDue();
+  widest_.rod = -1; // told at the start
 }
 
-namespace {
-
-/// Kinetic energy of a state, of each vertex at most what it has relative to the obstacles that move [J]: what one of
-/// them takes along is its to give.
-double kineticBesideObstacles(const Simulation &run, const State &state, double kinetic) {
-  struct Carried {
-    Vec3 about, velocity, spin;
-  };
-  std::vector<Carried> moving;
-  for (const Collider &c : run.scene.colliders)
-    if (c.motion.moves())
-      moving.push_back(
-          {c.poseAt(state.time).position, c.motion.velocityAt(state.time), c.motion.angularVelocityAt(state.time)});
-  for (std::size_t r = 0; r < run.elements->rods.size() && !moving.empty(); ++r) {
-    const RodRange &rod = run.elements->rods[r];
-    for (int i = 0; i < rod.vertices; ++i) {
-      const Vec3 &x = state.position[rod.first_vertex + i], &v = state.velocity[rod.first_vertex + i];
-      double least = v.squaredNorm();
-      for (const Carried &c : moving)
-        least = std::min(least, (v - c.velocity - c.spin.cross(x - c.about)).squaredNorm());
-      kinetic -= 0.5 * run.elements->mass()[rod.slot(i)] * (v.squaredNorm() - least);
-    }
-  }
-  return kinetic;
+void Recorder::writeFrame(const State &whole) {
+  last_frame_ = whole.time;
+  if (!leads()) return;
+  trajectory_->writeFrame(whole);
+  widest_.include(run_.scene, *run_.elements, whole);
 }
-
-} // namespace
 
 PetscErrorCode Recorder::observe(const State &state, const Diagnostics &row) {
   PetscFunctionBeginUser;
@@ -59,23 +38,25 @@ PetscErrorCode Recorder::observe(const State &state, const Diagnostics &row) {
   iterations_ += row.newton_iterations;
   rejected_ += row.rejected_steps;
   last_ = row;
-  trajectory_->writeDiagnostics(row);
-  if (arclength_ || state.time >= next_output_ * (1 - 1e-12) || state.time >= options_.loop.t_end) {
-    trajectory_->writeFrame(state);
-    widest_.include(run_.scene, *run_.elements, state);
-    while (options_.output_interval > 0 && next_output_ <= state.time * (1 + 1e-12))
-      next_output_ += options_.output_interval;
-  }
-  trajectory_->flushWhenDue();
-  if (options_.checkpoint_interval > 0 && state.step % options_.checkpoint_interval == 0) {
-    trajectory_->flush(); // a restart goes on where the frames end
-    writeCheckpoint(checkpoint_, run_, control_, facts_);
+  const bool frame = arclength_ || state.time >= next_output_ * (1 - 1e-12) || state.time >= options_.loop.t_end,
+             checkpoint = options_.checkpoint_interval > 0 && state.step % options_.checkpoint_interval == 0;
+  if (frame || checkpoint) prepared_.collect(state);
+  while (options_.output_interval > 0 && next_output_ <= state.time * (1 + 1e-12))
+    next_output_ += options_.output_interval;
+  if (leads()) trajectory_->writeDiagnostics(row);
+  if (frame) writeFrame(leads() ? run_.state : state);
+  if (leads()) {
+    trajectory_->flushWhenDue();
+    if (checkpoint) {
+      trajectory_->flush(); // a restart goes on where the frames end
+      writeCheckpoint(checkpoint_, run_, control_, facts_);
+    }
   }
   progress_.step(row);
   dissipated_ += row.dissipated;
   work_ += std::abs(row.work.loads + row.work.supports);
   work_of_obstacles_ += std::abs(row.work.obstacles);
-  most_kinetic_ = std::max(most_kinetic_, kineticBesideObstacles(run_, state, row.energy.kinetic));
+  most_kinetic_ = std::max(most_kinetic_, row.energy.kinetic - row.carried);
   const double stored = row.energy.total() - row.energy.kinetic;
   if (std::isnan(first_stored_)) first_stored_ = stored;
   most_stored_ = std::max(most_stored_, std::abs(stored - first_stored_));
@@ -105,15 +86,17 @@ PetscErrorCode Recorder::noteCritical(const CriticalPoint &point) {
   line << (point.limit ? "limit point: " : "") << "critical load factor " << std::setprecision(10) << point.load_factor;
   progress_.say(line.str());
   critical_factors_.push_back(point.load_factor);
-  trajectory_->writeCritical(point.load_factor);
-  trajectory_->writeFrame(*point.state);
-  trajectory_->flush();
+  if (leads()) trajectory_->writeCritical(point.load_factor);
+  writeFrame(prepared_.collect(*point.state));
+  if (leads()) trajectory_->flush();
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode Recorder::end(bool stopped) {
   PetscFunctionBeginUser;
-  if (stopped && trajectory_->lastTime() < run_.state.time) trajectory_->writeFrame(run_.state);
+  const State &whole = prepared_.collect(prepared_.run->state);
+  if (stopped && last_frame_ < whole.time) writeFrame(whole);
+  if (!leads()) PetscFunctionReturn(0);
   PetscCall(PetscLogEventBegin(events().output, 0, 0, 0, 0));
   const Summary at_end = summarize(run_.scene, *run_.elements, run_.state, options_.loop.dynamic ? 1 : run_.state.time,
                                    options_.loop.dynamic);
@@ -137,7 +120,7 @@ double smallEnergy(const Simulation &run) {
   double little = 0;
   for (std::size_t r = 0; r < run.scene.rods.size(); ++r) {
     const Material &m = run.scene.rods[r].material;
-    const double length = run.potential->length(int(r)),
+    const double length = run.elements->length(int(r)),
                  stiff = std::max(m.flexural_stiffness[0], m.flexural_stiffness[1]);
     little += 1e-9 * (stiff > 0 ? stiff / length : 1e-6 * m.axial_stiffness * length);
   }

@@ -15,7 +15,7 @@
 #include "tendril/io/stop.hpp"
 #include "tendril/io/take_up.hpp"
 #include "tendril/io/text.hpp"
-#include "tendril/layout/alone.hpp"
+#include "tendril/layout/launch.hpp"
 #include "tendril/solver/activity.hpp"
 #include "tendril/solver/events.hpp"
 
@@ -33,7 +33,7 @@ namespace {
 /// which -malloc_debug takes for corrupted.
 std::string initializePetsc(int *argc, char ***argv) {
   auto *const print = std::exchange(PetscErrorPrintf, &PetscErrorPrintfNone);
-  startAlone();
+  prepareMpi();
   const PetscErrorCode error = PetscInitialize(argc, argv, nullptr, nullptr);
   PetscErrorPrintf = print;
   if (!error) return {};
@@ -53,7 +53,7 @@ void print(const std::string &text) {
 PetscErrorCode tellError(const Prepared &prepared, double rounding_error, const std::vector<double> &critical,
                          const Options &o, Progress &progress) {
   PetscFunctionBeginUser;
-  const Simulation &run = *prepared.run;
+  const Simulation &run = prepared.whole();
   Estimate estimate;
   PetscCall(estimateError(run, rounding_error, critical,
                           remesh(prepared.written, prepared.drawings, edgesOf(run.scene, 2)), o.loop, &estimate));
@@ -79,23 +79,17 @@ std::string textOf(const SceneSource &source) {
 }
 
 /// The command line, as far as it stands alone. \throws SceneError
-PetscErrorCode readCommandLine(int argc, char **argv, const OptionFiles &files, Options *o) {
-  PetscFunctionBeginUser;
+void readCommandLine(int argc, char **argv, const OptionFiles &files, Options *o) {
   {
     const QuietErrors errors;
     if (readOptions(argc, argv, o)) throw SceneError("command line: " + errors.message());
   }
-  if (o->schema || o->keys) PetscFunctionReturn(0);
+  if (o->schema || o->keys) return;
   if (o->scene.empty())
     throw SceneError("option -scene: is required: tendril -scene data/scenes/helix.yaml (-help lists all options)");
   if (const std::string place = files.place("scene"); !place.empty() && !std::filesystem::exists(o->scene))
     throw SceneError(place + ": the scene '" + o->scene +
                      "' cannot be opened; its path begins in the folder where tendril is started");
-  int ranks;
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &ranks));
-  if (ranks > 1)
-    throw SceneError("tendril runs on one process, found " + std::to_string(ranks) + "; start it without mpiexec");
-  PetscFunctionReturn(0);
 }
 
 /// \throws SceneError where a result would take the place of a file that the run reads.
@@ -109,17 +103,16 @@ void refuseToReplaceInputs(const OutputFolder &folder, const OptionFiles &files,
 }
 
 /// What a restart asks of the run that it goes on with.
-PetscErrorCode factsOf(const Simulation &run, const Options &o, const SceneSource &source, RunFacts *facts) {
-  PetscFunctionBeginUser;
-  *facts = RunFacts(run.scene, o.loop, textOf(source));
+RunFacts factsOf(const Simulation &run, const Options &o, const SceneSource &source) {
+  RunFacts facts(run.scene, o.loop, textOf(source));
   for (const char *name : {"snes_rtol", "snes_max_it"}) {
     const std::string option = std::string("-") + name;
     char value[64];
-    PetscBool given;
-    PetscCall(PetscOptionsGetString(nullptr, nullptr, option.c_str(), value, sizeof value, &given));
-    facts->facts.push_back({RunFacts::Kind::option, name, given ? value : findKey(option)->fallback});
+    PetscBool given = PETSC_FALSE;
+    (void)PetscOptionsGetString(nullptr, nullptr, option.c_str(), value, sizeof value, &given);
+    facts.facts.push_back({RunFacts::Kind::option, name, given ? value : findKey(option)->fallback});
   }
-  PetscFunctionReturn(0);
+  return facts;
 }
 
 /// From the state of a run to its end, a stop or a failure, which is empty else.
@@ -165,49 +158,58 @@ void tellStop(const State &state, const Options &o, const StopRequest &request, 
   progress.say(line.str());
 }
 
-PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequest::Clock::time_point begin,
-                       int *exit_code) {
-  PetscFunctionBeginUser;
-  Options o;
-  PetscCall(readCommandLine(argc, argv, files, &o));
-  if (o.schema || o.keys) {
-    print(o.schema ? schemaAsJson() : keysAsJson());
-    PetscFunctionReturn(0);
-  }
-  Prepared prepared;
-  {
-    const QuietErrors errors;
-    if (prepare(prepared, o)) throw SceneError("setting up the solvers: " + errors.message());
-  }
-  if (o.help) PetscFunctionReturn(0);
-  PetscCall(refuseUnknownOptions());
-  const OutputFolder folder(o.output_dir);
-  refuseToReplaceInputs(folder, files, prepared.source);
+/// What a run has before its first step, on the leading rank.
+struct Begun {
+  std::optional<OutputFolder> folder;
+  RunFacts facts;
+  Provenance origin;
+  std::optional<Progress> progress;
   Choice choice;
-  if (o.accuracy) PetscCall(meetAccuracy(prepared, o, &choice));
-  const StopRequest request(begin, o.time_limit); // before this, nothing is written: a signal ends the run at once
-  Simulation &run = *prepared.run;
-  TimeLoop loop(run.solver, o.loop);
-  RunFacts facts(run.scene, o.loop);
-  PetscCall(factsOf(run, o, prepared.source, &facts));
-  std::vector<std::string> told;
-  if (!takeUp(o, folder, facts, run, &loop.control, &told)) PetscFunctionReturn(0);
+};
 
-  Provenance origin = provenance(argc, argv);
+/// Takes up what is to be gone on with, and tells what is run. \return false where nothing is left to do
+bool begin(int argc, char **argv, const Options &o, Prepared &prepared, StepControl *control, Begun *out) {
+  Simulation &whole = prepared.whole();
+  std::vector<std::string> told;
+  if (!takeUp(o, *out->folder, out->facts, whole, control, &told)) return false;
+  Provenance &origin = out->origin;
+  origin = provenance(argc, argv);
+  origin.ranks = prepared.team.size();
   origin.scene = std::move(prepared.source);
-  origin.effective_options = writeOptionsFile(o.output_dir + "/options.yaml", o, origin, run.scene);
-  Progress progress(o.loop, o.output_dir + "/log.txt");
+  origin.effective_options = writeOptionsFile(o.output_dir + "/options.yaml", o, origin, whole.scene);
+  Progress &progress = out->progress.emplace(o.loop, o.output_dir + "/log.txt", true);
   progress.say(origin.command_line);
   for (const std::string &line : told) progress.say(line);
-  std::istringstream groups(groupsText(run.scene));
+  std::istringstream groups(groupsText(whole.scene));
   for (std::string line; std::getline(groups, line);) progress.say(line);
   for (const std::string &note : prepared.notes) progress.say(note);
-  for (const std::string &line : choice.lines) progress.log(line);
+  for (const std::string &line : out->choice.lines) progress.log(line);
+  return true;
+}
 
-  Recorder recorder(o, run, loop.control, facts, origin, progress);
+/// \return the exit code; of use on the leading rank
+PetscErrorCode runPrepared(Prepared &prepared, int argc, char **argv, const Options &o, const StopRequest &request,
+                           Begun &begun, int *exit_code) {
+  PetscFunctionBeginUser;
+  const Team &team = prepared.team;
+  Simulation &run = *prepared.run;
+  TimeLoop loop(run.solver, o.loop);
+  bool goes_on = true;
+  team.together([&] {
+    if (!team.leads()) return;
+    begun.facts = factsOf(prepared.whole(), o, prepared.source);
+    goes_on = begin(argc, argv, o, prepared, &loop.control, &begun);
+  });
+  if (!team.all(goes_on)) PetscFunctionReturn(0);
+  if (!o.restart.empty()) prepared.spread();
+  loop.control.share(team);
+  if (!team.leads()) begun.progress.emplace(o.loop, "", false);
+  Progress &progress = *begun.progress;
+  Recorder recorder(o, prepared, loop.control, begun.facts, begun.origin, progress);
   bool finished;
   std::string failure;
   PetscCall(march(run, loop, o, request, recorder, progress, &finished, &failure));
+  if (!team.leads()) PetscFunctionReturn(0);
   const bool stopped = !finished && failure.empty();
   if (const std::string growth = recorder.tellGrowth(finished); !growth.empty()) {
     finished = false;
@@ -215,7 +217,7 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   }
   recorder.tellAccuracy();
   if (stopped) {
-    tellStop(run.state, o, request, origin.command_line, progress);
+    tellStop(run.state, o, request, begun.origin.command_line, progress);
     *exit_code = request.exitCode();
   } else if (!finished) {
     progress.fail(failure);
@@ -225,6 +227,35 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   if (finished && o.error_estimate && o.loop.dynamic) tellTimeError(recorder.last(), o, progress);
   if (finished && o.error_estimate && !o.loop.dynamic)
     PetscCall(tellError(prepared, recorder.last().rounding_error, recorder.criticalFactors(), o, progress));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequest::Clock::time_point start,
+                       int *exit_code) {
+  PetscFunctionBeginUser;
+  const Team world = Team::world();
+  Options o;
+  world.together([&] { readCommandLine(argc, argv, files, &o); });
+  if (o.schema || o.keys) {
+    if (world.leads()) print(o.schema ? schemaAsJson() : keysAsJson());
+    PetscFunctionReturn(0);
+  }
+  Prepared prepared;
+  prepare(prepared, o);
+  if (o.help) PetscFunctionReturn(0);
+  Begun begun;
+  world.together([&] {
+    if (!prepared.team.isEmpty()) (void)refuseUnknownOptions(); // others have asked for none
+    if (!world.leads()) return;
+    begun.folder.emplace(o.output_dir);
+    refuseToReplaceInputs(*begun.folder, files, prepared.source);
+  });
+  if (o.accuracy) meetAccuracy(prepared, o, &begun.choice);
+  const StopRequest request(start, o.time_limit, world.leads()); // before, nothing is written: a signal ends at once
+  if (!prepared.team.isEmpty()) PetscCall(runPrepared(prepared, argc, argv, o, request, begun, exit_code));
+  double code = *exit_code; // ranks without rods wait here
+  world.share({&code, 1});
+  *exit_code = int(code);
   PetscFunctionReturn(0);
 }
 
@@ -254,11 +285,11 @@ bool printAsked(const std::vector<char *> &words) {
                        [&](const char *word) { return std::string_view(word) == option; });
   };
   if (given("--version")) {
-    print(versionText() + "\n");
+    if (launchedRank() == 0) print(versionText() + "\n");
     return true;
   }
   if (!given("-help") && !given("-h") && !given("--help")) return false;
-  print(helpText());
+  if (launchedRank() == 0) print(helpText());
   return !given("-scene") && !given("-options_file");
 }
 
@@ -270,6 +301,7 @@ int fail(const std::string &message, int exit_code) {
 /// The run itself, between PetscInitialize and PetscFinalize. \return the exit code
 int runScene(int argc, char **argv, const OptionFiles &files, StopRequest::Clock::time_point begin) {
   int exit_code = 0;
+  const Team world = Team::world();
   try {
     const QuietErrors errors;
     const PetscErrorCode error = [&]() -> PetscErrorCode {
@@ -281,15 +313,15 @@ int runScene(int argc, char **argv, const OptionFiles &files, StopRequest::Clock
     }();
     if (error) throw SceneError("solving: " + errors.message());
   } catch (const std::exception &e) {
-    int rank;
-    MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
+    const bool agreed = world.isAlone() || dynamic_cast<const AgreedError *>(&e);
     const std::string message =
         dynamic_cast<const std::bad_alloc *>(&e) ? "there is not enough memory for this scene" : files.locate(e.what());
-    if (rank == 0) fail(message, 1);
-    exit_code = 1;
-    if (dynamic_cast<const WriteError *>(&e)) {
+    const auto *known = dynamic_cast<const SceneError *>(&e);
+    exit_code = known ? known->exitCode() : 1;
+    if (!agreed || world.leads()) fail(message, exit_code);
+    if (!agreed || exit_code == 3) { // HDF5 tries a file again that it could not write, when MPI ends, and crashes there
       std::fflush(nullptr);
-      std::_Exit(3); // HDF5 tries a file again that it could not write, when MPI ends, and crashes there
+      world.abort(exit_code);
     }
   }
   return exit_code;
@@ -314,10 +346,10 @@ int runMain(int count, char **arguments) {
   try {
     files.read(argc, argv);
   } catch (const SceneError &e) {
-    return fail(e.what(), 1);
+    return launchedRank() == 0 ? fail(e.what(), 1) : 1;
   }
   if (const std::string mistake = initializePetsc(&argc, &argv); !mistake.empty())
-    return fail(files.locate("command line: " + mistake), 1);
+    return launchedRank() == 0 ? fail(files.locate("command line: " + mistake), 1) : 1;
   signals.restore();
   const int exit_code = runScene(argc, argv, files, begin);
   (void)PetscOptionsSetValue(nullptr, "-options_left", "no"); // checked before the first step, with better words

@@ -6,7 +6,7 @@
 namespace tendril {
 namespace {
 
-volatile std::sig_atomic_t caught = 0;
+volatile std::sig_atomic_t caught = 0, silent = 0;
 timespec first; ///< when the signal that asked to stop came
 
 /// One request may come as two signals: `timeout` sends its own to the process and to its group.
@@ -18,7 +18,7 @@ extern "C" void catchSignal(int signal) {
   if (caught == 0) {
     first = now;
     caught = signal;
-    (void)!write(STDERR_FILENO, text, sizeof text - 1);
+    if (!silent) (void)!write(STDERR_FILENO, text, sizeof text - 1);
   } else if (double(now.tv_sec - first.tv_sec) + 1e-9 * double(now.tv_nsec - first.tv_nsec) > same_request) {
     std::signal(signal, SIG_DFL);
     std::raise(signal);
@@ -38,8 +38,10 @@ void KeptSignals::restore() const {
   for (const auto &[signal, action] : before_) sigaction(signal, &action, nullptr);
 }
 
-StopRequest::StopRequest(Clock::time_point begin, std::optional<double> limit) : begin_(begin), limit_(limit) {
+StopRequest::StopRequest(Clock::time_point begin, std::optional<double> limit, bool speaks)
+    : begin_(begin), limit_(limit) {
   caught = 0;
+  silent = !speaks;
   for (const int signal : {SIGINT, SIGTERM}) {
     struct sigaction now = {}, before = {};
     sigaction(signal, nullptr, &before);

@@ -48,7 +48,7 @@ PetscErrorCode DofMap::createSection(PetscSection *section) const {
   PetscInt points = 0;
   for (const RodRange &r : rods_) points += r.vertices + r.edges;
   for (const JoinedEdge &j : joined_edges_.items) points += j.isFirst();
-  PetscCall(PetscSectionCreate(PETSC_COMM_WORLD, section));
+  PetscCall(PetscSectionCreate(PETSC_COMM_SELF, section));
   PetscCall(PetscSectionSetNumFields(*section, groups_ == 0 ? 2 : 3));
   PetscCall(PetscSectionSetFieldName(*section, 0, "position"));
   PetscCall(PetscSectionSetFieldComponents(*section, 0, 3));
@@ -94,10 +94,8 @@ PetscErrorCode DofMap::createSection(PetscSection *section) const {
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode DofMap::setUp(const Scene &scene) {
-  PetscFunctionBeginUser;
+void DofMap::layOut(const Scene &scene) {
   rods_.clear();
-  unknown_begin_.clear();
   vertices_ = edges_ = 0;
   std::vector<int> along(scene.rods.size(), 0); // slots of supports that are not at ends, and of constraints
   for (const Support &s : scene.supports)
@@ -132,10 +130,15 @@ PetscErrorCode DofMap::setUp(const Scene &scene) {
   unknown_end_.clear();
   for (const RodRange &rod : rods_) unknown_end_.push_back(rod.vertexEnd());
   if (joins) join(scene, before_joins);
+}
 
+PetscErrorCode DofMap::setUp(const Scene &scene) {
+  PetscFunctionBeginUser;
+  layOut(scene);
+  unknown_begin_.clear();
   OwnedSection section;
   PetscCall(createSection(section.out()));
-  PetscCall(DMShellCreate(PETSC_COMM_WORLD, dm_.out()));
+  PetscCall(DMShellCreate(PETSC_COMM_SELF, dm_.out()));
   PetscCall(DMSetLocalSection(dm_, section));
   PetscCall(DMShellSetCreateGlobalVector(dm_, createGlobalVector));
   PetscCall(DMShellSetCreateLocalVector(dm_, createLocalVector));

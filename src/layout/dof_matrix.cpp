@@ -85,8 +85,7 @@ PetscErrorCode DofMap::createMatrix(RodSet rods, bool joins, Mat *matrix, Patter
           couple(difference(a), difference(c), EdgeBlocks::vertex(a, c), t.copy - rod.first_slot, a == c);
     }
   }
-  const bool whole = rods.begin == 0 && rods.end == int(rods_.size());
-  PetscCall(MatCreate(whole ? PETSC_COMM_WORLD : PETSC_COMM_SELF, matrix));
+  PetscCall(MatCreate(PETSC_COMM_SELF, matrix));
   PetscCall(MatSetSizes(*matrix, unknowns(rods), unknowns(rods), PETSC_DETERMINE, PETSC_DETERMINE));
   PetscCall(MatSetType(*matrix, MATAIJ));
   PetscCall(MatSetFromOptions(*matrix));

@@ -58,11 +58,6 @@ template <class Item> bool sameList(const std::vector<Item> &a, const std::vecto
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Item &x, const Item &y) { return same(x, y); });
 }
 
-template <class Item> void keep(const std::vector<Item> &from, const std::vector<int> &place, std::vector<Item> &to) {
-  for (const Item &item : from)
-    if (place[item.rod] >= 0) to.emplace_back(item).rod = place[item.rod];
-}
-
 } // namespace
 
 std::vector<int> firstAlike(const Scene &scene, const std::vector<Drawing> &drawings) {
@@ -88,26 +83,6 @@ std::vector<int> firstAlike(const Scene &scene, const std::vector<Drawing> &draw
     if (found == kinds.end()) kinds.push_back(s);
   }
   return first;
-}
-
-Scene withRods(const Scene &scene, const std::vector<int> &rods) {
-  Scene out;
-  out.gravity = scene.gravity;
-  out.rotation = scene.rotation;
-  out.colliders = scene.colliders;
-  std::vector<int> place(scene.rods.size(), -1);
-  for (const int r : rods) {
-    place[r] = int(out.rods.size());
-    out.rods.push_back(scene.rods[r]);
-  }
-  keep(scene.supports, place, out.supports);
-  keep(scene.constraints, place, out.constraints);
-  for (Constraint &c : out.constraints)
-    if (c.isTie()) c.to_rod = place[c.to_rod];
-  if (rods.size() == scene.rods.size()) out.junctions = scene.junctions; // of joined rods none is left out
-  keep(scene.forces, place, out.forces);
-  keep(scene.moments, place, out.moments);
-  return out;
 }
 
 } // namespace tendril

@@ -33,10 +33,55 @@ double Scene::collidersEvenUntil(double from, double to) const {
   return to;
 }
 
+std::int64_t Scene::edges() const {
+  if (whole) return whole->edges;
+  std::int64_t sum = 0;
+  for (const Rod &rod : rods) sum += rod.edges();
+  return sum;
+}
+
+bool Scene::slides() const {
+  if (whole) return whole->slides;
+  return !colliders.empty() && std::any_of(rods.begin(), rods.end(), [](const Rod &r) {
+    return r.contact.on && r.contact.slides();
+  });
+}
+
 bool Scene::strainsDissipate() const {
+  if (whole) return whole->strains_dissipate;
   return std::any_of(rods.begin(), rods.end(),
                      [](const Rod &rod) { return rod.material.stiffness_damping_coefficient != 0; }) ||
          std::any_of(constraints.begin(), constraints.end(), [](const Constraint &c) { return c.damping != 0; });
+}
+
+template <class Item>
+static void keep(const std::vector<Item> &from, const std::vector<int> &place, std::vector<Item> &to) {
+  for (const Item &item : from)
+    if (place[item.rod] >= 0) to.emplace_back(item).rod = place[item.rod];
+}
+
+Scene withRods(const Scene &scene, const std::vector<int> &rods) {
+  Scene out;
+  out.gravity = scene.gravity;
+  out.rotation = scene.rotation;
+  out.colliders = scene.colliders;
+  std::vector<int> place(scene.rods.size(), -1);
+  for (const int r : rods) {
+    place[r] = int(out.rods.size());
+    out.rods.push_back(scene.rods[r]);
+  }
+  keep(scene.supports, place, out.supports);
+  keep(scene.constraints, place, out.constraints);
+  for (Constraint &c : out.constraints)
+    if (c.isTie()) c.to_rod = place[c.to_rod];
+  for (const Junction &j : scene.junctions) {
+    if (place[j.members.front().rod] < 0) continue;
+    Junction &kept = out.junctions.emplace_back(j);
+    for (Junction::Member &m : kept.members) m.rod = place[m.rod];
+  }
+  keep(scene.forces, place, out.forces);
+  keep(scene.moments, place, out.moments);
+  return out;
 }
 
 void setBishopDirectors(Rod &rod, const Vec3 &start) {

@@ -251,7 +251,7 @@ PetscErrorCode multiply(Mat a, Vec x, Vec y) {
 PetscErrorCode createBandedMatrix(BandedSystem *system, Mat *matrix) {
   PetscFunctionBeginUser;
   const PetscInt n = system->dofs->unknowns(system->rods);
-  PetscCall(MatCreateShell(PETSC_COMM_WORLD, n, n, PETSC_DETERMINE, PETSC_DETERMINE, system, matrix));
+  PetscCall(MatCreateShell(PETSC_COMM_SELF, n, n, PETSC_DETERMINE, PETSC_DETERMINE, system, matrix));
   PetscCall(MatShellSetOperation(*matrix, MATOP_MULT, (void (*)(void))multiply));
   PetscCall(MatSetOption(*matrix, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(MatSetOption(*matrix, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));

@@ -15,6 +15,10 @@ IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, con
     : scene_(scene), dofs_(dofs), elements_(elements), retraction_(elements), axial_(scene, elements),
       terms_(makeTerms(scene, elements, axial_, dynamic)), supports_(scene, dofs, elements), start_(elements.slots),
       known_(elements.rods.size(), Known::nothing), scales_(rodScales(scene, elements)),
+      couples_positions_(
+          std::any_of(terms_.begin(), terms_.end(), [](const auto &term) { return term->couplesPositions(); })),
+      joins_positions_(
+          std::any_of(terms_.begin(), terms_.end(), [](const auto &term) { return term->joinsPositions(); })),
       obstacles_move_(scene.collidersMove()), obstacles_held_(scene.rods.size(), false) {}
 
 void IncrementalPotential::beginStep(const State &start, const Step &step) {

@@ -224,7 +224,7 @@ bool NewtonSolver::search(RodSet island, double *lambda) {
   for (int r = island.begin; r < island.end; ++r) {
     potential_->accept(work_->trial, r);
     work_->energy[r] = work_->tried[r];
-    work_->energy_known[r] = potential_->scene().moments.empty(); // the work of couples is counted from the iterate
+    work_->energy_known[r] = !potential_->scene().hasCouples(); // the work of couples is counted from the iterate
   }
   return true;
 }
@@ -302,7 +302,7 @@ void NewtonSolver::predict() {
       potential_->accept(work_->trial, r);
       if (rule.lengths == RetractionKind::additive) potential_->resetAxialForces(r);
       work_->energy[r] = work_->tried[r];
-      work_->energy_known[r] = potential_->scene().moments.empty();
+      work_->energy_known[r] = !potential_->scene().hasCouples();
     }
   }
 }

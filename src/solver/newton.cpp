@@ -242,7 +242,7 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
   // From a saddle the way down may be long, and shorter load steps begin at the same one; of fine rods they are still
   // the cheaper way.
   int limits = report_.escapes > 0 && seek_ == Seek::minimum && patience_ == 0 &&
-                       potential_->elements().edges() <= most_searched_edges
+                       potential_->scene().edges() <= most_searched_edges
                    ? limits_from_saddle
                    : 1;
   do {

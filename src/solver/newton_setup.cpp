@@ -141,7 +141,7 @@ PetscErrorCode NewtonSolver::createSnes() {
   else
     PetscCall(VecCreateSeq(PETSC_COMM_SELF, dofs.unknowns(rods_), x_.out()));
   for (OwnedVec *v : {&f_, &right_, &solution_}) PetscCall(VecDuplicate(x_, v->out()));
-  PetscCall(SNESCreate(whole ? PETSC_COMM_WORLD : PETSC_COMM_SELF, snes_.out()));
+  PetscCall(SNESCreate(PETSC_COMM_SELF, snes_.out()));
   if (whole) PetscCall(SNESSetDM(snes_, dofs.dm()));
   PetscCall(SNESSetApplicationContext(snes_, this));
   PetscCall(SNESSetType(snes_, SNESNEWTONLS));

@@ -97,8 +97,7 @@ Residual residualOf(const Elements &elements, const Material &m, const Step &ste
 }
 
 void Residual::include(const Residual &other) {
-  for (double Residual::*part : {&Residual::force, &Residual::moment, &Residual::compatibility, &Residual::force_floor,
-                                 &Residual::moment_floor, &Residual::compatibility_floor})
+  for (double Residual::*part : residual_parts)
     if (other.*part > this->*part || std::isnan(other.*part)) this->*part = other.*part;
 }
 

@@ -326,7 +326,7 @@ PetscErrorCode NewtonSolver::settleNeutral(bool first, bool creeps, Seek seek, O
   report_.zero_pivots += std::max(0, negative);
   report_.negative_pivots = 0;
   if (first) report_.first_negative_pivots = 0;
-  const bool descends = creeps && potential_->elements().edges() <= most_searched_edges;
+  const bool descends = creeps && potential_->scene().edges() <= most_searched_edges;
   Configuration here;
   if (descends) here = potential_->iterate();
   PetscCall(settle(Seek::equilibrium, now));

@@ -5,43 +5,25 @@
 #include <algorithm>
 
 namespace tendril {
-namespace {
 
-/// Cuts the scene into blocks of at least so many edges (about 2 kB each), and at least a pack of rods to factor
-/// together. An island of several rods is a block by itself.
-std::vector<RodSet> blocksOf(const DofMap &dofs) {
-  constexpr int block_edges = 800;
-  const std::vector<RodRange> &rods = dofs.rods();
-  const int count = int(rods.size());
-  std::vector<RodSet> blocks;
-  int begin = 0, edges = 0;
-  auto close = [&](int end) {
-    if (end > begin) blocks.push_back({begin, end});
-    begin = end;
-    edges = 0;
-  };
-  for (int r = 0; r < count; ++r) {
+static std::vector<RodSet> blocksOf(const DofMap &dofs) {
+  std::vector<int> edges, island_end;
+  for (int r = 0; r < dofs.all().end; ++r) {
     const RodSet island = dofs.islandOf(r);
-    if (dofs.isJoined(island)) {
-      close(r);
-      close(island.end);
-      r = island.end - 1;
-      continue;
-    }
-    edges += rods[r].edges;
-    if ((edges < block_edges || (r + 1 - begin) % lanes != 0) && edges < 4 * block_edges && r + 1 < count) continue;
-    close(r + 1);
+    edges.push_back(dofs.rods()[r].edges);
+    island_end.push_back(dofs.isJoined(island) ? island.end : 0);
   }
+  std::vector<RodSet> blocks;
+  for (const Block &block : blocksOf(edges, island_end)) blocks.push_back(block.rods);
   return blocks;
 }
 
-} // namespace
-
-PetscErrorCode StepSolver::setUp(IncrementalPotential &potential, Coupling coupling) {
+PetscErrorCode StepSolver::setUp(IncrementalPotential &potential, Coupling coupling, const Share &share) {
   PetscFunctionBeginUser;
   potential_ = &potential;
-  std::vector<RodSet> blocks;
-  if (coupling == Coupling::none) blocks = blocksOf(potential.dofs());
+  share_ = share;
+  std::vector<RodSet> blocks = share.blocks;
+  if (blocks.empty() && coupling == Coupling::none) blocks = blocksOf(potential.dofs());
   if (blocks.size() > 1) {
     PetscCall(setUpBlocks(blocks));
     if (blocks_.size() == blocks.size()) PetscFunctionReturn(0);
@@ -76,17 +58,53 @@ PetscErrorCode StepSolver::solve(const State &start, const Step &step, NewtonRep
   *report = {};
   report->converged = true;
   report->reason = "converged";
-  for (NewtonSolver &block : blocks_) {
+  double failed = HUGE_VAL; // the place of the first block that fails
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    NewtonSolver &block = blocks_[b];
     NewtonReport one;
     if (step.isStatic() && seek == Seek::minimum && !guess)
       PetscCall(solveBlock(block, start, &one));
     else
       PetscCall(block.solve(start, &one, seek, guess));
+    if (!one.converged) {
+      failed = b < share_.place.size() ? share_.place[b] : double(b);
+      *report = one;
+      break;
+    }
     report->include(one);
-    if (!one.converged) break;
     if (on_block) on_block(block.rods());
   }
+  agree(failed, report);
   PetscFunctionReturn(0);
+}
+
+/// Makes the reports of all ranks one, by one reduction where all have converged.
+void StepSolver::agree(double failed, NewtonReport *report) const {
+  const Team &team = share_.team;
+  if (team.isAlone()) return;
+  double first = failed;
+  NewtonReport all = *report;
+  Tally tally;
+  tally.smallest(first);
+  all.tally(tally);
+  team.combine(tally);
+  if (!std::isfinite(first)) {
+    *report = all;
+    return;
+  }
+  double owner = failed == first ? team.rank() : team.size();
+  Tally lowest;
+  team.combine(lowest.smallest(owner));
+  const int from = int(owner);
+  team.share(report->reason, from);
+  report->converged = false;
+  double numbers[] = {double(report->iterations), double(report->lost), double(report->first_negative_pivots),
+                      double(report->shifts)};
+  team.share(numbers, from);
+  report->iterations = int(numbers[0]);
+  report->lost = numbers[1] != 0;
+  report->first_negative_pivots = int(numbers[2]);
+  report->shifts = int(numbers[3]);
 }
 
 /// Statics. Fine rods that do not converge soon begin again where fewer edges lead; where that leads nowhere, Newton
@@ -123,32 +141,63 @@ PetscErrorCode StepSolver::solveBlock(NewtonSolver &block, const State &start, N
 }
 
 PetscErrorCode StepSolver::rehearse(const State &start, const Step &step) {
-  int negative;
   PetscFunctionBeginUser;
   begin(start, step);
-  PetscCall(inertiaAtIterate(&negative));
-  for (NewtonSolver &block : blocks_) PetscCall(block.setUpLinear());
+  for (NewtonSolver &block : blocks_) {
+    int negative;
+    PetscCall(block.inertiaAtIterate(&negative));
+    PetscCall(block.setUpLinear());
+  }
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode StepSolver::inertiaAtIterate(int *negative, double lift) {
   PetscFunctionBeginUser;
   *negative = 0;
+  bool factored = true;
   for (NewtonSolver &block : blocks_) {
     int one;
     PetscCall(block.inertiaAtIterate(&one, lift));
-    *negative = one < 0 || *negative < 0 ? -1 : *negative + one;
+    factored = factored && one >= 0;
+    *negative += one;
   }
+  bool fails = !factored;
+  Tally tally;
+  share_.team.combine(tally.any(fails).sum(*negative));
+  if (fails) *negative = -1;
   PetscFunctionReturn(0);
 }
 
+/// Each block by itself, so that what it finds does not depend on those before it.
 PetscErrorCode StepSolver::criticalMode(int stable, double neutral, Planes *mode, bool *found) {
-  double lift = neutral;
   PetscFunctionBeginUser;
   *mode = potential_->dofs().makePlanes();
-  for (NewtonSolver &block : blocks_) PetscCall(block.criticalMode(stable, &lift, mode));
-  *found = lift > neutral;
+  double highest = neutral, place = HUGE_VAL;
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    double lift = neutral;
+    Planes one = potential_->dofs().makePlanes();
+    PetscCall(blocks_[b].criticalMode(stable, &lift, &one));
+    if (!(lift > highest)) continue;
+    highest = lift;
+    place = b < share_.place.size() ? share_.place[b] : double(b);
+    *mode = std::move(one);
+  }
+  double of_all = highest;
+  Tally tally;
+  share_.team.combine(tally.largest(of_all));
+  if (highest < of_all) place = HUGE_VAL;
+  double first = place;
+  Tally order;
+  share_.team.combine(order.smallest(first));
+  if (place > first) mode->clear(); // of another rank
+  *found = of_all > neutral;
   PetscFunctionReturn(0);
+}
+
+void NewtonReport::tally(Tally &t) {
+  t.largest(iterations).sum(edge_iterations).sum(trials).sum(shifts).sum(negative_pivots).sum(zero_pivots);
+  t.sum(first_negative_pivots).sum(escapes).largest(rounding_error);
+  for (double Residual::*part : residual_parts) t.largest(residual.*part);
 }
 
 void NewtonReport::addWork(const NewtonReport &before) {

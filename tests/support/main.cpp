@@ -1,4 +1,4 @@
-#include "tendril/layout/alone.hpp"
+#include "tendril/layout/launch.hpp"
 #include "tendril/solver/events.hpp"
 #include "tendril/solver/newton.hpp"
 
@@ -6,7 +6,7 @@
 
 int main(int argc, char **argv) {
   testing::InitGoogleTest(&argc, argv);
-  tendril::startAlone();
+  tendril::prepareMpi();
   if (PetscInitialize(&argc, &argv, nullptr, nullptr)) return 1;
   if (tendril::registerEvents() || tendril::registerSolvers()) return 1;
   const int result = RUN_ALL_TESTS();

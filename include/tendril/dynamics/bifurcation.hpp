@@ -20,7 +20,7 @@ struct BranchPoint {
 /// Whether two points may be of one branch: before a limit point a rod moves by the root of the interval; beyond it,
 /// Newton jumps.
 /// \param width of the interval that is searched
-bool areNear(const BranchPoint &a, const BranchPoint &b, double width);
+bool areNear(const Team &team, const BranchPoint &a, const BranchPoint &b, double width);
 
 struct CriticalPoint {
   double load_factor = 0;
@@ -54,7 +54,7 @@ PetscErrorCode locateCritical(StepSolver &solver, const Step &step, const Follow
 PetscErrorCode countUnstable(StepSolver &solver, int *unstable);
 
 /// Largest distance between vertices of two states, relative to the size of the scene.
-double distanceBetween(const State &a, const State &b);
+double distanceBetween(const Team &team, const State &a, const State &b);
 
 /// While it lives, Newton's tolerance is one that leaves critical loads eight digits.
 class SharpTolerance {

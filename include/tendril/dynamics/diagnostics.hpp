@@ -15,6 +15,7 @@ struct Diagnostics {
   EnergyBudget energy;
   Work work;             ///< of loads and supports in the step [J]
   double dissipated = 0; ///< by the step: the fall of the energies, and the work [J]
+  double carried = 0;    ///< kinetic energy that obstacles may have given [J]
   int newton_iterations = 0, line_search_trials = 0, negative_pivots = 0, rejected_steps = 0;
   double contact_gap_min = HUGE_VAL; ///< between surfaces of rods and obstacles [m]; infinite where there are none
   double wall_seconds = 0;

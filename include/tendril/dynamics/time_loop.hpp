@@ -48,6 +48,9 @@ struct StepControl {
   double rounding_sum = 0; ///< of all steps, over rod lengths
   double energy =
       NAN; ///< at the end of the last step, from which the next one dissipates; NAN where there was none [J]
+
+  /// That of the leading rank to all.
+  void share(const Team &team);
 };
 
 /// Takes steps and tells the observer of each one accepted.
@@ -57,7 +60,7 @@ public:
   StepControl control;
   CriticalObserver on_critical; ///< told of each critical point, before the step beyond it
   std::function<bool()>
-      stops; ///< asked after each step whether to end there: `finished` is false then, and failure() is empty
+      stops; ///< asked in each step whether to end after it: `finished` is false then, and failure() is empty
   TimeLoop(StepSolver &solver, const LoopSettings &settings)
       : solver_(solver), settings_(settings), integrator_(makeIntegrator(settings.integrator)) {}
 
@@ -91,16 +94,20 @@ private:
     Step step;
     double h = 0; ///< its length [s, or load factor]
     NewtonReport report;
-    EnergyBudget energy;
-    Work work;             ///< statics
-    double gap = HUGE_VAL; ///< smallest between surfaces in contact [m]
+    EnergySums energy;
+    WorkSums work;
+    ExactSum held_before, held_after; ///< kinetic energy of vertices that moving supports hold [J]
+    ExactSum carried;                 ///< see Diagnostics
+    double gap = HUGE_VAL;            ///< smallest between surfaces in contact [m]
     StepError error;
     bool too_coarse = false; ///< for the error asked for
+    bool stops = false;      ///< whether the run is asked to end
     void commit(const IncrementalPotential &potential, RodSet rods, State *next);
   };
   void prepare(const State &state);
   PetscErrorCode attempt(const State &state, State *next, Attempt *now);
   bool mayPassCritical(const State &state, const NewtonReport &report) const;
+  void measure(const State &state, const State &next, Attempt *now);
   void accept(State &state, State &next, Attempt *now, Work *work);
   bool shorten(const State &state, double h, const NewtonReport &report);
   void lengthen(const NewtonReport &report);
@@ -112,8 +119,8 @@ private:
   StepError stepError(const State &start, double h) const;
   void noteActions(RodSet rods);
   void finish(const State &start, double h, RodSet rods, State *next);
-  Work dynamicWork(const State &start, double h) const;
-  double movedKinetic(const State &state) const;
+  void addDynamicWork(const State &start, double h, WorkSums &work) const;
+  void addHeldEnergy(const State &state, ExactSum &sum) const;
   void remember(const State &start, double h, State *next) const;
   double nextStep(double time, double *landing) const;
   bool adapt(double h, double dt_min, const StepError &error);

@@ -4,6 +4,7 @@
 /// write one file with a class derived from Term and add one line to makeTerms (terms.cpp).
 
 #include "tendril/energy/cell.hpp"
+#include "tendril/geometry/exact_sum.hpp"
 #include "tendril/state/stage.hpp"
 
 #include <memory>
@@ -51,6 +52,22 @@ struct EnergyBudget {
   double total() const { return kinetic + stretch + bend + twist + gravity + constraint + contact; }
   EnergyBudget &operator+=(const EnergyBudget &other);
 };
+inline constexpr double EnergyBudget::*named_energies[] = {
+    &EnergyBudget::kinetic, &EnergyBudget::stretch,    &EnergyBudget::bend,   &EnergyBudget::twist,
+    &EnergyBudget::gravity, &EnergyBudget::constraint, &EnergyBudget::contact};
+/// Those of rods that may be on several ranks.
+struct EnergySums {
+  std::array<ExactSum, std::size(named_energies)> sums;
+  void add(const EnergyBudget &budget) {
+    for (std::size_t k = 0; k < sums.size(); ++k) sums[k].add(budget.*named_energies[k]);
+  }
+  EnergyBudget value() const {
+    EnergyBudget budget;
+    for (std::size_t k = 0; k < sums.size(); ++k) budget.*named_energies[k] = sums[k].value();
+    return budget;
+  }
+};
+
 class Term {
 public:
   virtual ~Term() = default;

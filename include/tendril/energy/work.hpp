@@ -4,6 +4,7 @@
 /// quadratures.
 
 #include "tendril/energy/term.hpp"
+#include "tendril/layout/team.hpp"
 
 namespace tendril {
 
@@ -25,8 +26,15 @@ double coupleWork(const Vec3 &moment, double torque, const Vec3 &from, const Vec
 
 /// Work of forces and couples between two configurations of one step, the load factor going from one value to another
 /// at a steady rate. A weight that grows adds to the potential that energies have of it: that counts here [J].
-double workOfLoads(const Scene &scene, const Elements &elements, const Configuration &start, const Configuration &end,
-                   double factor_start, double factor_end);
+void addWorkOfLoads(const Scene &scene, const Elements &elements, const Configuration &start, const Configuration &end,
+                    double factor_start, double factor_end, ExactSum &sum);
+
+/// Work of rods that may be on several ranks.
+struct WorkSums {
+  ExactSum loads, supports, obstacles;
+  Work value() const { return {loads.value(), supports.value(), obstacles.value()}; }
+  void tally(Tally &tally) { tally.sum(loads).sum(supports).sum(obstacles); }
+};
 
 /// What holders do to their rods: force [N], then moment [N m] about the vertex, or the origin of the obstacle, of
 /// each. The inertia of a held vertex itself is not in it: what it takes is the change of its kinetic energy.
@@ -48,10 +56,15 @@ std::vector<Holder> movingObstacles(const Scene &scene);
 double workOf(const Holder &holder, const std::array<Vec3, 2> &action, const Elements &elements,
               const Configuration &start, const Configuration &end, double from, double to);
 
-/// Both between two equilibria at the load factors that are their times, by the trapezoidal rule.
-Work staticWork(const Scene &scene, const Elements &elements, const State &before, const State &after,
-                const Configuration &start, const Configuration &end);
+/// Work of loads and supports between two equilibria at the load factors that are their times, by the trapezoidal rule.
+void addStaticWork(const Scene &scene, const Elements &elements, const State &before, const State &after,
+                   const Configuration &start, const Configuration &end, WorkSums &work);
 /// The same, where no configurations are at hand and no couple has turned its edge by more than half a turn.
-Work staticWork(const Scene &scene, const Elements &elements, const State &before, const State &after);
+void addStaticWork(const Scene &scene, const Elements &elements, const State &before, const State &after,
+                   WorkSums &work);
+
+/// Of the kinetic energy of a state what obstacles that move may have given: of each vertex what it has less when seen
+/// from one of them, at most [J].
+void addCarriedEnergy(const Scene &scene, const Elements &elements, const State &state, ExactSum &sum);
 
 } // namespace tendril

@@ -16,6 +16,7 @@ namespace tendril {
 /// A file of results that cannot be written, though its folder could be.
 struct WriteError : SceneError {
   using SceneError::SceneError;
+  int exitCode() const override { return 3; }
 };
 
 /// An HDF5 handle, closed by `close`.

@@ -14,6 +14,9 @@ namespace tendril {
 /// Words of -bifurcation, in the order of Bifurcation.
 inline constexpr std::array<std::string_view, 4> bifurcations{"off", "locate", "stop", "switch"};
 
+/// Words of -partition, in the order of PartitionKind.
+inline constexpr std::array<std::string_view, 3> partitions{"auto", "contiguous", "metis"};
+
 /// What is in force in a run: the command line over the scene's `simulation` block.
 struct Options {
   std::string scene; ///< empty when not given
@@ -26,6 +29,7 @@ struct Options {
   std::optional<Bifurcation> bifurcation;
   Overrides overrides;
   LoopSettings loop;
+  PartitionKind partition = PartitionKind::automatic;
   int load_steps = 1;
   std::optional<Vec3> gravity;
   std::vector<std::pair<std::string, int>> rod_edges; ///< by names of rods, in order of the command line

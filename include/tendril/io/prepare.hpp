@@ -3,24 +3,42 @@
 /// From a scene file and options to a scene that is ready to run.
 
 #include "tendril/accuracy/accuracy.hpp"
+#include "tendril/dynamics/slice.hpp"
 #include "tendril/io/options.hpp"
 
 namespace tendril {
 
-/// A scene ready to run; and as written, when it may have to be drawn again.
+/// A scene ready to run, on this rank its part of it; and as written, when it may have to be drawn again.
 struct Prepared {
-  std::unique_ptr<Simulation> run;
+  Team team;                       ///< of the ranks that have rods; empty on others
+  std::unique_ptr<Simulation> run; ///< of the rods of this rank
+  std::unique_ptr<Simulation> described; ///< the whole scene, where the leading rank has a part only
+  Slice slice;
   SceneSource source;
   std::vector<std::string> notes;
   Scene written;
   std::vector<Drawing> drawings;
+
+  /// What results are made of: the whole scene with the state collected last; on the leading rank.
+  Simulation &whole() const { return described ? *described : *run; }
+  /// A state of the whole scene on the leading rank, from the parts of all.
+  const State &collect(const State &part) const {
+    if (slice.isAll()) return part;
+    slice.collect(*run->elements, part, described ? described->elements.get() : nullptr, &whole().state);
+    return whole().state;
+  }
+  /// The state of the whole scene to the parts of all ranks.
+  void spread() const {
+    if (!slice.isAll())
+      slice.spread(*run->elements, &run->state, described ? described->elements.get() : nullptr, &whole().state);
+  }
 };
 
-/// Reads the scene and sets everything up. \throws SceneError
-PetscErrorCode prepare(Prepared &prepared, Options &options);
+/// Reads the scene and sets everything up, on all ranks of the program. \throws SceneError
+void prepare(Prepared &prepared, Options &options);
 /// \throws SceneError where rods lie in obstacles at the time of their state
 void refuseOverlaps(const Simulation &run);
 /// Chooses the edges, and in dynamics the steps, and makes the scene ready to run with them.
-PetscErrorCode meetAccuracy(Prepared &prepared, Options &options, Choice *choice);
+void meetAccuracy(Prepared &prepared, Options &options, Choice *choice);
 
 } // namespace tendril

@@ -11,7 +11,8 @@ namespace tendril {
 
 class Progress {
 public:
-  Progress(const LoopSettings &loop, const std::string &log_path);
+  /// \param speaks whether it is this rank that tells
+  Progress(const LoopSettings &loop, const std::string &log_path, bool speaks);
   ~Progress();
   Progress(const Progress &) = delete;
   void step(const Diagnostics &row);
@@ -28,7 +29,7 @@ private:
   bool terminal_, open_line_ = false;
   double next_report_ = 0; ///< fraction of the run at which the next line is due when there is no terminal
   double next_line_ = 0;   ///< wall time of the run at which the line on a terminal is due again [s]
-  std::FILE *log_;
+  std::FILE *log_ = nullptr; ///< null on ranks that do not speak
   void endLine();
   void tell(const std::string &line, bool rewrites, bool logs);
 };

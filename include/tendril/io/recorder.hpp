@@ -6,14 +6,16 @@
 #include "tendril/energy/widest_angle.hpp"
 #include "tendril/io/checkpoint.hpp"
 #include "tendril/io/options.hpp"
+#include "tendril/io/prepare.hpp"
 #include "tendril/io/progress.hpp"
 
 namespace tendril {
 
+/// The leading rank writes and tells; all ranks call, for what they have goes to it.
 class Recorder {
 public:
   /// Begins the files of results with the state as it is. \throws WriteError
-  Recorder(const Options &options, const Simulation &run, const StepControl &control, const RunFacts &facts,
+  Recorder(const Options &options, const Prepared &prepared, const StepControl &control, const RunFacts &facts,
            const Provenance &origin, Progress &progress);
 
   /// After every step.
@@ -35,7 +37,8 @@ public:
 
 private:
   const Options &options_;
-  const Simulation &run_;
+  const Prepared &prepared_;
+  const Simulation &run_; ///< of the whole scene on the leading rank
   const StepControl &control_;
   const RunFacts &facts_;
   Progress &progress_;
@@ -45,12 +48,15 @@ private:
   Diagnostics last_;
   std::vector<double> critical_factors_;
   double next_output_ = 0; ///< [s]
+  double last_frame_ = -1; ///< time of it [s, or load factor]
   long steps_ = 0, iterations_ = 0, rejected_ = 0;
   bool told_unstable_ = false;
   WidestAngle widest_;
   double dissipated_ = 0, gained_ = 0, work_ = 0, work_of_obstacles_ = 0; ///< [J]
   double most_kinetic_ = 0, first_stored_ = NAN, most_stored_ = 0;        ///< [J]
 
+  bool leads() const { return prepared_.team.leads(); }
+  void writeFrame(const State &whole);
   void tellInstability(const Diagnostics &row);
 };
 

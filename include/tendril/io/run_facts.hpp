@@ -22,6 +22,7 @@ struct RunFacts {
   std::string topology_hash,
       scene_hash; ///< of vertices, edges and closedness of all rods; of the text of the scene and its files
 
+  RunFacts() = default;
   /// \param text of the scene and the files it names
   RunFacts(const Scene &scene, const LoopSettings &settings, const std::string &text = "");
 };

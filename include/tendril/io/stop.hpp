@@ -27,8 +27,8 @@ private:
 class StopRequest {
 public:
   using Clock = std::chrono::steady_clock;
-  /// \param limit wall time from `begin` [s]
-  StopRequest(Clock::time_point begin, std::optional<double> limit);
+  /// \param limit wall time from `begin` [s] \param speaks whether it is this rank that tells
+  StopRequest(Clock::time_point begin, std::optional<double> limit, bool speaks = true);
   ~StopRequest();
   StopRequest(const StopRequest &) = delete;
   bool asked() const;

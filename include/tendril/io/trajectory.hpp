@@ -46,7 +46,6 @@ public:
   /// Ends the files; nothing may be written afterwards. \throws WriteError when that fails
   void finish();
   int frames() const { return int(times_.size()); }
-  double lastTime() const { return times_.empty() ? -1 : times_.back(); }
 
   /// Fields of a state.
   static const std::vector<std::string> &fieldNames();

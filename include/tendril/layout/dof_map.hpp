@@ -24,6 +24,8 @@ namespace tendril {
 class DofMap {
 public:
   PetscErrorCode setUp(const Scene &scene);
+  /// Numbers vertices, edges and slots only, for a scene whose steps are solved elsewhere.
+  void layOut(const Scene &scene);
 
   const std::vector<RodRange> &rods() const { return rods_; }
   int vertices() const { return vertices_; }

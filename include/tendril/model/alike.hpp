@@ -10,7 +10,4 @@ namespace tendril {
 /// frame that turns, its own number.
 std::vector<int> firstAlike(const Scene &scene, const std::vector<Drawing> &drawings);
 
-/// The scene with some of its rods only, and what holds and pulls them. \param rods increasing
-Scene withRods(const Scene &scene, const std::vector<int> &rods);
-
 } // namespace tendril

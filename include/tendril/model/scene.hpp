@@ -7,6 +7,8 @@
 #include "tendril/model/material.hpp"
 #include "tendril/model/strain.hpp"
 
+#include <cstdint>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -16,6 +18,7 @@ namespace tendril {
 /// A mistake in the user's input. what() names the file and line (or the option), what was found and what to write.
 struct SceneError : std::runtime_error {
   using std::runtime_error::runtime_error;
+  virtual int exitCode() const { return 1; }
 };
 /// A number with three digits, for messages.
 std::string shortText(double value);
@@ -145,19 +148,29 @@ struct Scene {
     }
   } rotation;
 
+  /// What is asked of the whole scene, where this is the part of it that one rank has: what a run does follows from
+  /// all rods, whichever rank has them.
+  struct Whole {
+    bool strains_dissipate, slides, has_couples;
+    std::int64_t edges;
+  };
+  std::optional<Whole> whole;
   /// Whether anything dissipates by the rate of its strains: the stiffness of a rod, or a constraint.
   bool strainsDissipate() const;
+  bool hasCouples() const { return whole ? whole->has_couples : !moments.empty(); }
+  std::int64_t edges() const;
   bool collidersMove() const;
   /// The latest time up to another, later one until which all obstacles move evenly (Motion::evenUntil).
   double collidersEvenUntil(double from, double to) const;
   /// Whether a rod may touch anything.
   bool touches(int rod) const { return !colliders.empty() && rods[rod].contact.on; }
   /// Whether friction or damping acts on any.
-  bool slides() const {
-    return std::any_of(rods.begin(), rods.end(),
-                       [this](const Rod &r) { return !colliders.empty() && r.contact.on && r.contact.slides(); });
-  }
+  bool slides() const;
 };
+
+/// The scene with some of its rods only, in any order, and what holds, joins and pulls them.
+/// \param rods with all that any of them is joined to
+Scene withRods(const Scene &scene, const std::vector<int> &rods);
 
 /// Fills the directors of a rod with discrete Bishop frames: `start` (or some normal of the first edge when zero)
 /// transported along the polyline; on a closed rod the angle that remains after one round is spread over the edges by

@@ -5,6 +5,7 @@
 
 #include "tendril/coupling/couplings.hpp"
 #include "tendril/energy/work.hpp"
+#include "tendril/layout/team.hpp"
 #include "tendril/solver/residual.hpp"
 #include "tendril/state/commit.hpp"
 #include "tendril/state/retraction.hpp"
@@ -102,13 +103,14 @@ public:
   }
   /// Derivatives of whole islands with another Hessian than the step's; they stay until one of their rods moves.
   void assemble(RodSet islands, HessianKind hessian);
-  /// Whether any term couples the coordinates of one vertex.
-  bool couplesPositions() const {
-    return std::any_of(terms_.begin(), terms_.end(), [](const auto &term) { return term->couplesPositions(); });
-  }
+  /// Whether any term of the scene couples the coordinates of one vertex.
+  bool couplesPositions() const { return couples_positions_; }
   /// Whether any couples positions with edges.
-  bool joinsPositions() const {
-    return std::any_of(terms_.begin(), terms_.end(), [](const auto &term) { return term->joinsPositions(); });
+  bool joinsPositions() const { return joins_positions_; }
+  /// The same of a whole scene of which this rank has a part: its matrices are of one form on all ranks.
+  void agree(const Team &team) {
+    couples_positions_ = team.any(couples_positions_);
+    joins_positions_ = team.any(joins_positions_);
   }
   const EdgeBlocks &blocks() const { return derivatives_.blocks; }
 
@@ -223,6 +225,7 @@ private:
   Known &known(int rod) { return known_[dofs_.islandOf(rod).begin]; }
   std::vector<RodScale> scales_;
 
+  bool couples_positions_, joins_positions_;
   bool obstacles_move_;
   std::vector<char> obstacles_held_; ///< per rod
 

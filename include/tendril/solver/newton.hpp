@@ -3,6 +3,7 @@
 /// One implicit step by SNES: Newton with the exact Hessian, its inertia read at every factorisation, and the line
 /// search `retraction`.
 
+#include "tendril/layout/team.hpp"
 #include "tendril/solver/banded.hpp"
 #include "tendril/solver/circulatory.hpp"
 #include "tendril/solver/imbalance.hpp"
@@ -36,6 +37,8 @@ struct NewtonReport {
   bool mayPassCritical() const { return first_negative_pivots > 0 || shifts > 0; }
   /// Adds the report of another block of rods.
   void include(const NewtonReport &block);
+  /// Enters what becomes of it over all ranks, where all their blocks have converged.
+  void tally(Tally &tally);
   /// Counts what an earlier try at the same step took.
   void addWork(const NewtonReport &before);
 };

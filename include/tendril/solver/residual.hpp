@@ -34,6 +34,9 @@ struct Residual {
   void include(const Residual &other); ///< the larger of each; not a number is the largest
   bool isFinite() const { return std::isfinite(force) && std::isfinite(moment); }
 };
+inline constexpr double Residual::*residual_parts[] = {&Residual::force,         &Residual::moment,
+                                                       &Residual::compatibility, &Residual::force_floor,
+                                                       &Residual::moment_floor,  &Residual::compatibility_floor};
 
 /// \param out_of_balance forces and moments at the slots of the rod
 /// \param reach, steepness see IncrementalPotential::RodEnergy

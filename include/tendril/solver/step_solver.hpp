@@ -4,6 +4,8 @@
 /// blocks small enough to stay in the cache, a SNES each. Other linear solvers than `banded` get the whole scene as one
 /// system.
 
+#include "tendril/layout/partition.hpp"
+#include "tendril/layout/team.hpp"
 #include "tendril/solver/newton.hpp"
 
 #include <deque>
@@ -16,11 +18,19 @@ namespace tendril {
 /// a load factor).
 enum class Coupling { none, load };
 
+/// What a rank has of a scene that it shares with others.
+struct Share {
+  Team team;
+  std::vector<RodSet> blocks; ///< of rods that are solved together; none: as blocksOf
+  std::vector<double> place;  ///< of each block among those of all ranks
+};
+
 class StepSolver {
 public:
-  PetscErrorCode setUp(IncrementalPotential &potential, Coupling coupling = Coupling::none);
-  /// Minimises the potential of the step. The potential's iterate is the answer when `report` says converged;
-  /// iterations are the most of any block. In statics, where fine rods take many iterations, they begin again from the
+  /// \param share what this rank has of a larger scene
+  PetscErrorCode setUp(IncrementalPotential &potential, Coupling coupling = Coupling::none, const Share &share = {});
+  /// Minimises the potential of the step, on all ranks. The potential's iterate is the answer when `report` says
+  /// converged; iterations are the most of any block. After a failure the report is that of the first block that failed. In statics, where fine rods take many iterations, they begin again from the
   /// answer with fewer edges (solveCoarse). \param guess where to begin instead of at the start state
   PetscErrorCode solve(const State &start, const Step &step, NewtonReport *report, Seek seek = Seek::minimum,
                        const Guess *guess = nullptr);
@@ -38,7 +48,9 @@ public:
   /// lifted by `neutral`; `found` is false where there is none. The edge that turns most turns by one radian.
   PetscErrorCode criticalMode(int stable, double neutral, Planes *mode, bool *found);
 
-  IncrementalPotential &potential() { return *potential_; }
+  const Team &team() const { return share_.team; }
+  IncrementalPotential &potential() const { return *potential_; }
+  const std::deque<NewtonSolver> &blocks() const { return blocks_; }
   std::deque<NewtonSolver> &blocks() { return blocks_; }
   /// The solver of the first block.
   NewtonSolver &front() { return blocks_.front(); }
@@ -46,9 +58,11 @@ public:
 
 private:
   IncrementalPotential *potential_ = nullptr;
+  Share share_;
   std::optional<NewtonWork> work_;
   std::deque<NewtonSolver> blocks_;
 
+  void agree(double failed, NewtonReport *report) const;
   PetscErrorCode solveBlock(NewtonSolver &block, const State &start, NewtonReport *report);
   PetscErrorCode setUpBlocks(const std::vector<RodSet> &blocks);
 };

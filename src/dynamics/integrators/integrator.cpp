@@ -56,7 +56,7 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
     bool possible = true;
     for (int r = 0; r < potential.all().end; ++r)
       possible = potential.tryMove(back, 1, r, RetractionKind::additive, earlier) && possible;
-    if (possible) {
+    if (solver.team().all(possible)) {
       setTargets(potential.scene(), elements, state.time - moment, earlier);
       before = strainsOf(potential.scene(), elements, earlier);
       rest.damping_dt = moment;
@@ -128,7 +128,7 @@ std::vector<double> strainsBehind(StepSolver &solver, const State &start, const 
   };
   std::vector<double> behind = at(0);
   const std::vector<double> before = at(-moment * rule.damping_dt), after = at(moment * rule.damping_dt);
-  if (behind.empty() || before.empty() || after.empty()) return {};
+  if (solver.team().any(behind.empty() || before.empty() || after.empty())) return {};
   // Differences of the stages' strains instead where both are far apart: there the solution is far from the guess.
   constexpr double far = 0.05; // [rad]
   const std::vector<double> first = strainsOf(potential.scene(), elements, potential.start());
