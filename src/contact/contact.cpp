@@ -35,11 +35,10 @@ double momentumTowards(const Scene &scene, const Elements &elements, const RodCo
 }
 
 /// Sum of the loads on a rod [N].
-Vec3 resultantLoad(const Scene &scene, int r, double length) {
+Vec3 resultantLoad(const Scene &scene, const Elements &elements, int r, double length) {
   const Rod &rod = scene.rods[r];
   Vec3 sum = rod.gravity ? Vec3(rod.material.linear_density * length * scene.gravity) : Vec3(Vec3::Zero());
-  for (const NodalForce &f : scene.forces)
-    if (f.rod == r) sum += f.force;
+  for (const int k : elements.forcesOf(r)) sum += scene.forces[k].force;
   return sum;
 }
 
@@ -254,14 +253,14 @@ private:
         stiffness = before;
       else {
         const double length = elements_.length(r);
-        double force = loadScale(scene_, r, length);
+        double force = loadScale(scene_, elements_, r, length);
         const double stopping =
             step.isStatic() ? 0 : momentumTowards(scene_, elements_, rod, state, step.dt, r) / step.dt;
         force += stopping;
         stiffness = barrierStiffness(scene_, elements_, force, pressure, step.isStatic(), r);
         if (!step.isStatic() && before == 0) { // what is drawn touching is not thrown off
           rod.setStiffness(stiffness);
-          stiffness *= partBorne(rod, start, resultantLoad(scene_, r, length), stopping);
+          stiffness *= partBorne(rod, start, resultantLoad(scene_, elements_, r, length), stopping);
         }
       }
     }

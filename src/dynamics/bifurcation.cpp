@@ -156,8 +156,8 @@ bool areNear(const Team &team, const BranchPoint &a, const BranchPoint &b, doubl
 
 /// Bisection. Steps begin at `base`, the last point that is not within `aside` of the critical one, where the Hessian
 /// is nearly singular and Newton strays.
-static PetscErrorCode bisect(const Team &team, const Follow &follow, BranchPoint *low, BranchPoint *base, double high, double interval,
-                             double aside, double width) {
+static PetscErrorCode bisect(const Team &team, const Follow &follow, BranchPoint *low, BranchPoint *base, double high,
+                             double interval, double aside, double width) {
   PetscFunctionBeginUser;
   *base = *low;
   while (high - low->parameter > interval) {

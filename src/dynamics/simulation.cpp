@@ -25,10 +25,9 @@ PetscErrorCode Simulation::prepare(Scene part, const LoopSettings &settings, con
 
 PetscErrorCode Simulation::setUpSolver(const LoopSettings &settings, const Share &share) {
   PetscFunctionBeginUser;
-  PetscCall(solver.setUp(*potential, !settings.dynamic && settings.continuation == Continuation::arclength
-                                         ? Coupling::load
-                                         : Coupling::none,
-                         share));
+  PetscCall(solver.setUp(
+      *potential,
+      !settings.dynamic && settings.continuation == Continuation::arclength ? Coupling::load : Coupling::none, share));
   PetscFunctionReturn(0);
 }
 

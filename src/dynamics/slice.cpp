@@ -98,8 +98,7 @@ public:
     for (auto array : {&State::position, &State::position_low, &State::velocity})
       move(mine.*array, of(array), &Part::rods, vertices(), nv);
     move(mine.director, of(&State::director), &Part::rods, edges(), ne);
-    for (auto array : {&State::twist_rate, &State::axial_force})
-      move(mine.*array, of(array), &Part::rods, edges(), ne);
+    for (auto array : {&State::twist_rate, &State::axial_force}) move(mine.*array, of(array), &Part::rods, edges(), ne);
     move(mine.winding, of(&State::winding), &Part::rods, cells(), whole_ ? whole_->cell_slot.size() : 0);
     if (all && collects_) all->memory.resize(mine.memory.size());
     for (std::size_t n = 0; n < mine.memory.size(); ++n) {
@@ -184,8 +183,9 @@ private:
     std::vector<int> begin{0};
     for (const double n : all_counts) begin.push_back(begin.back() + int(n));
     if (!collects_) rows.resize(std::size_t(std::accumulate(counts.begin(), counts.end(), 0.0)));
-    move(rows, &all_rows, &Part::rods, [&](int r) { return std::pair(begin[r], int(all_counts[r])); },
-         std::size_t(begin.back()));
+    move(
+        rows, &all_rows, &Part::rods, [&](int r) { return std::pair(begin[r], int(all_counts[r])); },
+        std::size_t(begin.back()));
     if (collects_ && all)
       unfold(all_counts, all_rows, all->contacts);
     else if (!collects_)
@@ -211,10 +211,15 @@ void Slice::spread(const Elements &own, State *part, const Elements *whole, cons
   if (all) {
     copy = *state;
     const std::size_t action = 2 * std::size_t(holders_);
-    const double here[] = {copy.time, double(copy.step), copy.last_dt, copy.dt_before, double(copy.memory.size()),
+    const double here[] = {copy.time,
+                           double(copy.step),
+                           copy.last_dt,
+                           copy.dt_before,
+                           double(copy.memory.size()),
                            double(copy.strains.size() / strainRow(*whole)),
                            double(action > 0 ? copy.support_actions.size() / action : 0),
-                           double(!copy.contact_stiffness.empty()), double(!copy.contacts.empty())};
+                           double(!copy.contact_stiffness.empty()),
+                           double(!copy.contacts.empty())};
     std::copy(std::begin(here), std::end(here), facts);
   }
   team_.share(facts);

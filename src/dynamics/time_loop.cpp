@@ -124,9 +124,9 @@ void TimeLoop::Attempt::commit(const IncrementalPotential &potential, RodSet rod
 /// Whether a critical point may lie within the step. Couples have no potential: the inertia of the symmetric part says
 /// nothing about stability. What friction holds begins free, which is no critical point either.
 bool TimeLoop::mayPassCritical(const State &state, const NewtonReport &report) const {
-  return !settings_.dynamic && settings_.bifurcation != Bifurcation::off &&
-         !solver_.potential().scene().hasCouples() && !solver_.potential().scene().slides() && control.stable &&
-         located_ <= state.time && (report.first_negative_pivots > 0 || (isThorough() && report.mayPassCritical()));
+  return !settings_.dynamic && settings_.bifurcation != Bifurcation::off && !solver_.potential().scene().hasCouples() &&
+         !solver_.potential().scene().slides() && control.stable && located_ <= state.time &&
+         (report.first_negative_pivots > 0 || (isThorough() && report.mayPassCritical()));
 }
 
 /// Makes the answer of a step the state. Work since the last row adds to `work`.

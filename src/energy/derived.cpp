@@ -141,8 +141,8 @@ RodActions rodActions(const Scene &scene, const Elements &elements, const State 
       const double mass = elements.mass()[elements.vertex_slot[v]];
       Vec3 loads = scene.rotation.matrix() * (state.position[v] - scene.rotation.centre) * mass;
       if (rod.gravity) loads += mass * scene.gravity;
-      for (const NodalForce &f : scene.forces)
-        if (f.rod == r && f.vertex == vertex) loads += f.force;
+      for (const int f : elements.forcesOf(r))
+        if (scene.forces[f].vertex == vertex) loads += scene.forces[f].force;
       reaction += mass * rod.material.mass_damping_coefficient * state.velocity[v] - load_factor * loads;
       if (before >= 0) reaction += out.force[range.first_edge + before];
       if (after >= 0) reaction -= out.force[range.first_edge + after];

@@ -163,22 +163,22 @@ std::unique_ptr<Term> makeLoad(const Scene &scene, const Elements &elements) {
   return std::make_unique<Load>(scene, elements);
 }
 
-double loadScale(const Scene &scene, int r, double length) {
+double loadScale(const Scene &scene, const Elements &elements, int r, double length) {
   const Rod &rod = scene.rods[r];
   double s = rod.gravity ? rod.material.linear_density * length * scene.gravity.norm() : 0;
   s += rod.material.linear_density * length * length * scene.rotation.angular_velocity.squaredNorm();
   auto held = [&](int vertex) {
-    return std::any_of(scene.supports.begin(), scene.supports.end(), [&](const Support &support) {
-      return support.rod == r && support.vertex == vertex && support.holdsPosition();
-    });
+    const auto own = elements.supportsOf(r);
+    return std::any_of(own.begin(), own.end(),
+                       [&](int k) { return scene.supports[k].vertex == vertex && scene.supports[k].holdsPosition(); });
   };
   std::map<int, Vec3> force; // per vertex: forces that cancel are none
-  for (const NodalForce &f : scene.forces)
-    if (f.rod == r) force.try_emplace(f.vertex, Vec3::Zero()).first->second += f.force;
+  for (const int k : elements.forcesOf(r))
+    force.try_emplace(scene.forces[k].vertex, Vec3::Zero()).first->second += scene.forces[k].force;
   for (const auto &[vertex, f] : force)
     if (!held(vertex)) s += f.norm();
-  for (const EdgeMoment &c : scene.moments)
-    if (c.rod == r) s += (std::abs(c.torque) + c.moment.norm()) / length;
+  for (const int k : elements.momentsOf(r))
+    s += (std::abs(scene.moments[k].torque) + scene.moments[k].moment.norm()) / length;
   return s;
 }
 

@@ -101,8 +101,7 @@ void addStaticWork(const Scene &scene, const Elements &elements, const State &be
                       last = staticActions(scene, elements, after, moving);
   auto mean = [&](std::size_t k) { return Vec3(0.5 * (first[k] + last[k])); };
   for (std::size_t k = 0; k < moving.size(); ++k)
-    work.supports.add(
-        workOf(moving[k], {mean(2 * k), mean(2 * k + 1)}, elements, start, end, before.time, after.time));
+    work.supports.add(workOf(moving[k], {mean(2 * k), mean(2 * k + 1)}, elements, start, end, before.time, after.time));
 }
 
 void addStaticWork(const Scene &scene, const Elements &elements, const State &before, const State &after,

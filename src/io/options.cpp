@@ -83,6 +83,12 @@ public:
          "must be one of " + all + "; found '" + value + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?"));
   }
 
+  /// Which of the words of the table it is.
+  int choice(KeyOf<KeyType::word> key) const {
+    const std::vector<std::string> choices = choicesOf(*key);
+    return int(std::find(choices.begin(), choices.end(), word(key)) - choices.begin());
+  }
+
   [[noreturn]] static void fail(const Key &key, const std::string &message) {
     tendril::fail(std::string(key.name()), message);
   }
@@ -216,17 +222,13 @@ void readTime(Texts &texts, Options *o) {
   if (texts.has("-dt_adapt")) o->dynamic_only = "dt_adapt"; // -integrator may stay in statics, in sweeps over both
 }
 
-int placeOf(const std::string &word, const auto &words) {
-  return int(std::find(words.begin(), words.end(), word) - words.begin());
-}
-
 void readStatics(Texts &texts, Options *o) {
   if (texts.has("-load_steps")) o->given_load_steps = texts.integer("-load_steps");
   if (texts.has("-arclength_steps")) o->arclength_steps = texts.integer("-arclength_steps");
   o->loop.arclength_steps = texts.integer("-arclength_steps");
-  o->loop.continuation = texts.word("-continuation") == "load" ? Continuation::load : Continuation::arclength;
+  o->loop.continuation = Continuation(texts.choice("-continuation"));
   if (texts.has("-continuation")) o->continuation = o->loop.continuation;
-  o->loop.bifurcation = Bifurcation(placeOf(texts.word("-bifurcation"), bifurcations));
+  o->loop.bifurcation = Bifurcation(texts.choice("-bifurcation"));
   if (texts.has("-bifurcation")) o->bifurcation = o->loop.bifurcation;
 }
 
@@ -250,14 +252,10 @@ void readAccuracy(Texts &texts, Options *o) {
 
 void readSolver(Texts &texts, Options *o) {
   o->loop.solve.rounding_tolerance = texts.number("-rounding_tolerance");
-  o->loop.solve.retraction =
-      texts.word("-retraction") == "additive" ? RetractionKind::additive : RetractionKind::length;
-  const std::string search = texts.word("-line_search");
-  o->loop.solve.line_search = search == "wolfe"      ? LineSearchKind::wolfe
-                              : search == "residual" ? LineSearchKind::residual
-                                                     : LineSearchKind::energy;
+  o->loop.solve.retraction = RetractionKind(texts.choice("-retraction"));
+  o->loop.solve.line_search = LineSearchKind(texts.choice("-line_search"));
   o->loop.solve.quasi_newton = texts.integer("-quasi_newton");
-  o->partition = PartitionKind(placeOf(texts.word("-partition"), partitions));
+  o->partition = PartitionKind(texts.choice("-partition"));
   o->loop.mixed = texts.word("-stretch") == "mixed";
   o->loop.hessian = texts.word("-hessian") == "exact" ? HessianKind::exact : HessianKind::gauss_newton;
 }

@@ -6,6 +6,7 @@
 
 #include <iomanip>
 #include <sstream>
+#include <sys/resource.h>
 
 namespace tendril {
 
@@ -92,10 +93,27 @@ PetscErrorCode Recorder::noteCritical(const CriticalPoint &point) {
   PetscFunctionReturn(0);
 }
 
+namespace {
+
+constexpr int many_edges = 100000; ///< of a scene whose memory is more than that of the libraries
+
+/// Largest resident memory of all ranks together [bytes].
+double memoryOf(const Team &team) {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  std::int64_t kilobytes = usage.ru_maxrss;
+  Tally tally;
+  team.combine(tally.sum(kilobytes));
+  return 1024.0 * double(kilobytes);
+}
+
+} // namespace
+
 PetscErrorCode Recorder::end(bool stopped) {
   PetscFunctionBeginUser;
   const State &whole = prepared_.collect(prepared_.run->state);
   if (stopped && last_frame_ < whole.time) writeFrame(whole);
+  const double memory = memoryOf(prepared_.team);
   if (!leads()) PetscFunctionReturn(0);
   PetscCall(PetscLogEventBegin(events().output, 0, 0, 0, 0));
   const Summary at_end = summarize(run_.scene, *run_.elements, run_.state, options_.loop.dynamic ? 1 : run_.state.time,
@@ -110,6 +128,13 @@ PetscErrorCode Recorder::end(bool stopped) {
          << last_.wall_seconds << " s, results in " << options_.output_dir;
   progress_.say(counts.str());
   for (const std::string &line : describe(at_end, run_.scene)) progress_.say(line);
+  if (run_.elements->edges() >= many_edges) {
+    std::ostringstream line;
+    line << "  memory        " << std::setprecision(3) << memory / (1 << 20) << " MiB at most"
+         << (prepared_.team.isAlone() ? "" : ", of all ranks") << ", " << std::llround(memory / run_.elements->edges())
+         << " bytes an edge";
+    progress_.say(line.str());
+  }
   PetscFunctionReturn(0);
 }
 

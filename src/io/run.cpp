@@ -146,11 +146,11 @@ PetscErrorCode march(Simulation &run, TimeLoop &loop, const Options &o, const St
   PetscFunctionReturn(0);
 }
 
-void tellStop(const State &state, const Options &o, const StopRequest &request, const std::string &command_line,
+void tellStop(const State &state, const Options &o, int exit_code, const std::string &command_line,
               Progress &progress) {
   std::ostringstream line;
-  line << "stopped by " << request.reason() << " at " << (o.loop.dynamic ? "time " : "load factor ") << state.time
-       << " of " << o.loop.t_end;
+  line << "stopped by " << StopRequest::reason(exit_code) << " at " << (o.loop.dynamic ? "time " : "load factor ")
+       << state.time << " of " << o.loop.t_end;
   if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength)
     line << "; a path of equilibria cannot be gone on with";
   else
@@ -209,6 +209,9 @@ PetscErrorCode runPrepared(Prepared &prepared, int argc, char **argv, const Opti
   bool finished;
   std::string failure;
   PetscCall(march(run, loop, o, request, recorder, progress, &finished, &failure));
+  int asked = request.exitCode(); // by a signal that not all ranks may have had
+  Tally tally;
+  team.combine(tally.largest(asked));
   if (!team.leads()) PetscFunctionReturn(0);
   const bool stopped = !finished && failure.empty();
   if (const std::string growth = recorder.tellGrowth(finished); !growth.empty()) {
@@ -217,8 +220,8 @@ PetscErrorCode runPrepared(Prepared &prepared, int argc, char **argv, const Opti
   }
   recorder.tellAccuracy();
   if (stopped) {
-    tellStop(run.state, o, request, begun.origin.command_line, progress);
-    *exit_code = request.exitCode();
+    tellStop(run.state, o, asked, begun.origin.command_line, progress);
+    *exit_code = asked;
   } else if (!finished) {
     progress.fail(failure);
     *exit_code = 2;
@@ -319,7 +322,8 @@ int runScene(int argc, char **argv, const OptionFiles &files, StopRequest::Clock
     const auto *known = dynamic_cast<const SceneError *>(&e);
     exit_code = known ? known->exitCode() : 1;
     if (!agreed || world.leads()) fail(message, exit_code);
-    if (!agreed || exit_code == 3) { // HDF5 tries a file again that it could not write, when MPI ends, and crashes there
+    if (!agreed ||
+        exit_code == 3) { // HDF5 tries a file again that it could not write, when MPI ends, and crashes there
       std::fflush(nullptr);
       world.abort(exit_code);
     }

@@ -64,10 +64,10 @@ bool StopRequest::asked() const {
   return caught != 0 || (limit_ && std::chrono::duration<double>(Clock::now() - begin_).count() >= *limit_);
 }
 
-std::string StopRequest::reason() const {
-  return caught == SIGINT ? "SIGINT" : caught == SIGTERM ? "SIGTERM" : "-time_limit";
+std::string StopRequest::reason(int exit_code) {
+  return exit_code == 128 + SIGINT ? "SIGINT" : exit_code == 128 + SIGTERM ? "SIGTERM" : "-time_limit";
 }
 
-int StopRequest::exitCode() const { return caught != 0 ? 128 + int(caught) : 75; }
+int StopRequest::exitCode() const { return caught != 0 ? 128 + int(caught) : asked() ? 75 : 0; }
 
 } // namespace tendril

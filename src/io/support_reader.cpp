@@ -107,9 +107,10 @@ void readSupport(const YamlValue &value, SceneFile &out) {
     s.kind = type == "clamp" ? Support::Kind::clamp : type == "pin" ? Support::Kind::pin : Support::Kind::fix_twist;
     s.rod = r;
     s.vertex = readIndex(map, "supports[].vertex", rod.vertices(), rod.name);
-    for (const Support &other : scene.supports)
-      if (other.rod == r && other.vertex == s.vertex &&
-          ((other.holdsPosition() && s.holdsPosition()) || (other.holdsTwist() && s.holdsTwist())))
+    std::vector<int> &here = out.supports_at[{r, s.vertex}];
+    for (const int k : here)
+      if (const Support &other = scene.supports[k];
+          (other.holdsPosition() && s.holdsPosition()) || (other.holdsTwist() && s.holdsTwist()))
         value.fail("vertex " + std::to_string(s.vertex) + " of rod '" + rod.name + "' is held twice");
     s.frame = frameAtVertex(rod, s.vertex);
     if (type != "pin") {
@@ -146,6 +147,7 @@ void readSupport(const YamlValue &value, SceneFile &out) {
       out.notes.push_back("warning: " + value.place() + ": " + jump);
       warned = true;
     }
+    here.push_back(int(scene.supports.size()));
     scene.supports.push_back(s);
   }
   map.finish();
@@ -160,9 +162,10 @@ void readLoad(const YamlValue &value, SceneFile &out) {
     if (map.has("loads[].force")) {
       const NodalForce &load = scene.forces.emplace_back(r, readIndex(map, "loads[].vertex", rod.vertices(), rod.name),
                                                          map.vector("loads[].force"));
-      const bool held = std::any_of(scene.supports.begin(), scene.supports.end(), [&](const Support &s) {
-        return s.rod == r && s.vertex == load.vertex && s.holdsPosition();
-      });
+      const auto at = out.supports_at.find({r, load.vertex});
+      const bool held = at != out.supports_at.end() && std::any_of(at->second.begin(), at->second.end(), [&](int k) {
+                          return scene.supports[k].holdsPosition();
+                        });
       if (held && !warned && !load.force.isZero(0))
         out.notes.push_back("warning: " + value.place() + ": the force acts on vertex " + std::to_string(load.vertex) +
                             " of rod '" + rod.name + "', which a support holds: it moves nothing");

@@ -22,9 +22,9 @@ public:
   CellBuilder(const Scene &scene, int rod, Elements &out)
       : rod_(scene.rods[rod]), range_(out.rods[rod]), loose_(out.loose[rod]), next_(range_.looseSlot()), out_(out),
         joined_(out.joinedEdges({rod, rod + 1})), holder_(rod_.vertices(), nullptr) {
-    for (std::size_t s = 0; s < scene.supports.size(); ++s) {
+    for (const int s : out.supportsOf(rod)) {
       const Support &support = scene.supports[s];
-      if (support.rod != rod || !support.holdsTwist()) continue;
+      if (!support.holdsTwist()) continue;
       const Support *&holder = holder_[support.vertex];
       if (holder && holder->kind == Support::Kind::clamp) continue; // a clamp holds the twist as well
       if (holder) out.support_slot[holder - scene.supports.data()] = -1;
@@ -66,8 +66,9 @@ public:
       if (rod_.closed || holder_[v] || isJoined(v)) continue;
       const int cell = range_.slot(last ? edge : 1);
       EndCouple end{last, range_.slot(edge), out_.constants_[6][cell] != 0 ? cell : -1, {}, Vec3::Zero(), 0};
-      for (const EdgeMoment &m : scene.moments) {
-        if (m.rod != rod || m.edge != edge) continue;
+      for (const int k : out_.momentsOf(rod)) {
+        const EdgeMoment &m = scene.moments[k];
+        if (m.edge != edge) continue;
         end.moment += m.moment;
         end.torque += m.torque;
       }
@@ -169,8 +170,9 @@ private:
 
 Elements::Elements(const Scene &scene, const DofMap &dofs)
     : rods(dofs.rods()), slots(dofs.slots()), loose(rods.size()), end_couples(rods.size()),
-      support_slot(scene.supports.size(), -1), rod_cells{0}, groups(dofs.groups()), joined_edges_(dofs.joinedEdges()),
-      joined_vertices_(dofs.joinedVertices()), ties_(dofs.ties()) {
+      support_slot(scene.supports.size(), -1), rod_cells{0}, groups(dofs.groups()),
+      supports_(scene.supports, rods.size()), forces_(scene.forces, rods.size()), moments_(scene.moments, rods.size()),
+      joined_edges_(dofs.joinedEdges()), joined_vertices_(dofs.joinedVertices()), ties_(dofs.ties()) {
   std::vector<int> free_slots; ///< per rod, behind those of its supports
   constants_ = Planes(7, slots);
   joined_frame_.resize(joined_edges_.items.size());

@@ -72,10 +72,8 @@ std::vector<int> dealByMetis(const std::vector<std::int64_t> &weight, int ranks)
   idx_t options[METIS_NOPTIONS];
   METIS_SetDefaultOptions(options);
   options[METIS_OPTION_SEED] = seed;
-  const int few = 4; // below, recursive bisection evens out better
-  const auto deal = ranks <= few ? METIS_PartGraphRecursive : METIS_PartGraphKway;
-  if (deal(&blocks, &constraints, begin.data(), neighbours.data(), scaled.data(), nullptr, nullptr, &parts, nullptr,
-           nullptr, options, &cut, owner.data()) != METIS_OK)
+  if (METIS_PartGraphRecursive(&blocks, &constraints, begin.data(), neighbours.data(), scaled.data(), nullptr, nullptr,
+                               &parts, nullptr, nullptr, options, &cut, owner.data()) != METIS_OK)
     return {};
   std::vector<int> out(owner.begin(), owner.end());
   for (int rank = 0; rank < ranks; ++rank) // one without any is of no use

@@ -42,9 +42,8 @@ std::int64_t Scene::edges() const {
 
 bool Scene::slides() const {
   if (whole) return whole->slides;
-  return !colliders.empty() && std::any_of(rods.begin(), rods.end(), [](const Rod &r) {
-    return r.contact.on && r.contact.slides();
-  });
+  return !colliders.empty() &&
+         std::any_of(rods.begin(), rods.end(), [](const Rod &r) { return r.contact.on && r.contact.slides(); });
 }
 
 bool Scene::strainsDissipate() const {

@@ -27,7 +27,7 @@ std::vector<RodScale> rodScales(const Scene &scene, const Elements &elements) {
       for (int k = 0; k < 3; ++k) scale.bending += elements.cells()[cell_stiffness + k][elements.cell_slot[n]];
     for (const int k : elements.constraintsOf(int(r)))
       (scene.constraints[k].isPin() ? scale.pinning : scale.turning) += scene.constraints[k].stiffness;
-    scale.load = loadScale(scene, int(r), scale.length);
+    scale.load = loadScale(scene, elements, int(r), scale.length);
     scales.push_back(scale);
   }
   for (const Constraint &c : scene.constraints)

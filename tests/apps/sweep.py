@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""scripts/sweep: its table, orders, resumption after kills, failures and mistakes: sweep.py <tendril> <source folder>."""
+"""scripts/sweep: its table, orders, resumption after kills, failures, ranks, parts and mistakes:
+sweep.py <tendril> <source folder> [<kills>]."""
 import csv
 import glob
 import os
@@ -14,6 +15,7 @@ import h5py
 import numpy as np
 
 program, root = os.path.abspath(sys.argv[1]), os.path.abspath(sys.argv[2])
+kills = int(sys.argv[3]) if len(sys.argv) > 3 else 6
 elastica, cantilever = root + "/data/scenes/elastica.yaml", root + "/data/scenes/cantilever.yaml"
 
 
@@ -76,7 +78,7 @@ def resumes(tmp):
     words = (cantilever, "-t_end", "0.2", "-rod_young", "1e6:1e8:5log", "-dt", "2e-3,1e-3", "--observe", "tip=position[-1,-1]", "-j", 2)
     run(0, *words, "--out", tmp + "/whole")
     rng = random.Random(5)
-    for kill in range(6):
+    for kill in range(kills):
         process = subprocess.Popen(command(*words, "--out", tmp + "/killed"), stdout=subprocess.DEVNULL, start_new_session=True)
         time.sleep(rng.uniform(0.3, 1.5))
         process.send_signal(signal.SIGKILL)
@@ -93,6 +95,41 @@ def resumes(tmp):
     assert open(tmp + "/killed/table.csv").read() == open(tmp + "/whole/table.csv").read()
 
 
+def exact(tmp):
+    """Errors against what is known, and their orders: the elastica of 128 edges for the truth, to 1/16 of the error of 32."""
+    run(0, elastica, "-rod_edges", "128", "--observe", "tip=position[-1,-1]", "--out", tmp + "/fine")
+    tip = ",".join(table(tmp + "/fine")[0][f"tip_{k}"] for k in range(3))
+    run(0, elastica, "-rod_edges", "8,16,32", "--observe", "tip=position[-1,-1]", "--exact", "tip=" + tip, "--out", tmp + "/coarse")
+    errors = [float(r["tip_error"]) for r in table(tmp + "/coarse")]
+    assert errors[0] > errors[1] > errors[2] > 1e-5, errors
+    with open(tmp + "/coarse/orders.csv") as file:
+        order = next(float(r["order"]) for r in csv.DictReader(file) if r["observable"] == "tip_error")
+    assert abs(order - 2) < 0.2, order
+
+
+def ranks(tmp):
+    """The same numbers from runs of two ranks."""
+    words = (root + "/data/scenes/many_rods.yaml", "-rod_edges", "10,20", "-t_end", "0.02", "--observe", "tip=position[-1,-1]")
+    run(0, *words, "--out", tmp + "/one")
+    run(0, *words, "--mpi", 2, "--out", tmp + "/two")
+    one, two = table(tmp + "/one"), table(tmp + "/two")
+    assert [{**r, "run": ""} for r in one] == [{**r, "run": ""} for r in two], (one, two)
+    with open(glob.glob(tmp + "/two/*/run/log.txt")[0]) as file:
+        assert "ranks: 2, " in file.read()
+
+
+def parts(tmp):
+    """Jobs of Slurm that do a part each; the script is run as Slurm would, by hand."""
+    words = (elastica, "-rod_edges", "8,16,24,32,40", "--observe", "tip=position[-1,-1]", "--out", tmp + "/jobs")
+    text = run(0, *words, "--slurm", 2)
+    assert "sbatch " + tmp + "/jobs/sweep.sbatch" in text and not glob.glob(tmp + "/jobs/*/result.json"), text
+    for job, there in ((1, 3), (2, 5)):
+        done = subprocess.run(["bash", tmp + "/jobs/sweep.sbatch"], env={**os.environ, "SLURM_ARRAY_TASK_ID": str(job)}, capture_output=True, text=True, timeout=120)
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert len(glob.glob(tmp + "/jobs/*/result.json")) == there and not os.path.exists(tmp + "/jobs/table.csv")
+    assert "5 runs, 5 of them there already" in run(0, *words) and len(table(tmp + "/jobs")) == 5
+
+
 def mistakes(tmp):
     for words, told in (
             ([], "which scene"), ([tmp + "/none.yaml"], "cannot be read"), ([elastica, "-rod_edgs", "1,2"], "-rod_edgs"),
@@ -103,12 +140,14 @@ def mistakes(tmp):
             ([elastica, "--observe", "tip=positon[-1,-1]"], "position"), ([elastica, "--observe", "tip=position[-1,99999]"], "tip=position[-1,99999]"),
             ([elastica, "--zip", "dt,t_end", "-dt", "1,2"], "t_end does not vary"),
             ([elastica, "--zip", "dt,t_end", "-dt", "1,2", "-t_end", "1,2,3"], "-t_end has 3"), ([elastica, "-j", "0"], "whole number"),
+            ([elastica, "--mpi", "two"], "--mpi two"), ([elastica, "--part", "3/2"], "K from 1 to N"), ([elastica, "--slurm", "-1"], "number of jobs"),
+            ([elastica, "--exact", "tip=1"], "that of an --observe"), ([elastica, "--observe", "tip=position[-1,-1]", "--exact", "tip=1"], "3 numbers"),
             ([elastica, "--outt", "x"], "--outt"), ([elastica, "-output_dir", "x"], "not for a sweep"), ([elastica, "other.yaml"], "other.yaml")):
         text = run(1, *words, "--out", tmp + "/e")
         assert told in text and "Traceback" not in text, (words, text)
 
 
-for test in (mistakes, refines, zips, fails, resumes):
+for test in (mistakes, refines, zips, fails, exact, ranks, parts, resumes):
     with tempfile.TemporaryDirectory() as folder:
         test(folder)
 print("sweeps come to their tables")

@@ -162,7 +162,7 @@ def islands():
             ends = ("[0, 0, {z}]", "[0.2, 0, {z}]") if half == "a" else ("[0.2, 0, {z}]", "[0.2, -0.1, {z}]")
             begin, end = (e.format(z=f"{z:.6g}") for e in ends)
             text += f"  - {{name: {half}{i}, line: {{from: {begin}, to: {end}, edges: {n}}}, material: {material(rng)}}}\n"
-    text += rods(rng, 10)
+    text += rods(rng, 10, (10, 20))
     text += "supports:\n"
     for i in range(pairs):
         text += f"  - {{rod: a{i}, vertex: 0, type: clamp{', motion: {angular_velocity: [0, 0.2, 0]}' if i % 4 == 1 else ''}}}\n"
@@ -266,6 +266,18 @@ def group_restart():
     assert "stopped by -time_limit" in out, out
 
 
+def group_cases():
+    """Every documented run (scripts/nightly)."""
+    for case in sorted(os.listdir(source + "/options/cases")):
+        text = open(f"{source}/options/cases/{case}").read()
+        path = "arclength" in text
+        os.makedirs(folder + "/data", exist_ok=True)
+        for name in ("scenes", "polylines", "meshes"):
+            if os.path.isdir(f"{source}/data/{name}") and not os.path.exists(f"{folder}/data/{name}"):
+                os.symlink(f"{source}/data/{name}", f"{folder}/data/{name}")
+        same("case_" + case[:-5], "-options_file", f"{source}/options/cases/{case}", ranks=(1, 2), checkpoint=not path)
+
+
 groups = {name[6:]: function for name, function in globals().items() if name.startswith("group_")}
-for name in sys.argv[3:] or groups:
+for name in sys.argv[3:] or [g for g in groups if g != "cases"]:
     groups[name]()

@@ -92,7 +92,8 @@ inline constexpr Key option_keys[] = {
      "(residual), for comparison",
      anything, "energy|wolfe|residual", "wolfe", "solver"},
     {"-partition", KeyType::word, "", "auto",
-     "how rods are dealt out to the ranks of mpiexec: one behind the other (contiguous), by METIS, which evens out rods "
+     "how rods are dealt out to the ranks of mpiexec: one behind the other (contiguous), by METIS, which evens out "
+     "rods "
      "of different size (metis), or as is more even (auto)",
      anything, "auto|contiguous|metis", "metis", "solver", "islands of joined rods stay whole; results are the same"},
     {"-quasi_newton", KeyType::integer, "", "1",

@@ -10,8 +10,8 @@ namespace tendril {
 
 /// A scene ready to run, on this rank its part of it; and as written, when it may have to be drawn again.
 struct Prepared {
-  Team team;                       ///< of the ranks that have rods; empty on others
-  std::unique_ptr<Simulation> run; ///< of the rods of this rank
+  Team team;                             ///< of the ranks that have rods; empty on others
+  std::unique_ptr<Simulation> run;       ///< of the rods of this rank
   std::unique_ptr<Simulation> described; ///< the whole scene, where the leading rank has a part only
   Slice slice;
   SceneSource source;

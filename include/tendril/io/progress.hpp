@@ -12,7 +12,7 @@ namespace tendril {
 class Progress {
 public:
   /// \param speaks whether it is this rank that tells
-  Progress(const LoopSettings &loop, const std::string &log_path, bool speaks);
+  Progress(const LoopSettings &loop, const std::string &log_path, bool speaks = true);
   ~Progress();
   Progress(const Progress &) = delete;
   void step(const Diagnostics &row);

@@ -34,7 +34,9 @@ struct SceneFile {
   std::set<std::string> constraint_names;
   int constraint_blocks = 0, junction_blocks = 0;
   std::map<std::pair<int, int>, std::string> joined; ///< vertices in junctions, by rod and number: which
-  std::vector<Drawing> drawings;                     ///< per rod
+  /// Numbers of supports by the rods and vertices that they hold.
+  std::map<std::pair<int, int>, std::vector<int>> supports_at;
+  std::vector<Drawing> drawings; ///< per rod
   RunSettings run;
   std::vector<std::string> notes; ///< to be told at the start: defaults of materials, and warnings
 };

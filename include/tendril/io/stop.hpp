@@ -32,9 +32,10 @@ public:
   ~StopRequest();
   StopRequest(const StopRequest &) = delete;
   bool asked() const;
-  /// What asked, and the exit code that goes with it: 130, 143, or 75 for the limit of time.
-  std::string reason() const;
+  /// The exit code of what asked: 130, 143, or 75 for the limit of time; 0 where nothing has.
   int exitCode() const;
+  /// What asked, by its exit code.
+  static std::string reason(int exit_code);
 
 private:
   Clock::time_point begin_;

@@ -64,6 +64,10 @@ public:
   std::span<const int> constraintsOf(int rod) const {
     return constraints_.empty() ? std::span<const int>() : std::span<const int>(constraints_[rod]);
   }
+  /// What else the scene has of a rod, by number.
+  std::span<const int> supportsOf(int rod) const { return supports_.of(rod); }
+  std::span<const int> forcesOf(int rod) const { return forces_.of(rod); }
+  std::span<const int> momentsOf(int rod) const { return moments_.of(rod); }
   const Pins &pinsOf(int rod) const { return pins_.empty() ? no_pins_ : pins_[rod]; }
   double length(int rod) const { return length_[rod]; } ///< at rest [m]
   std::span<const JoinedEdge> joinedEdges(RodSet set) const { return joined_edges_.of(set); }
@@ -76,6 +80,7 @@ public:
   Elements(const Scene &scene, const DofMap &dofs);
 
 private:
+  NumbersByRod supports_, forces_, moments_;
   Planes constants_, cells_;
   std::vector<double> length_; ///< per rod
   ByRod<JoinedEdge> joined_edges_;

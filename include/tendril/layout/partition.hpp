@@ -33,7 +33,7 @@ struct Partition {
   std::vector<int> owner;    ///< rank of each block
   int ranks = 1;             ///< that have any; no more than there are blocks
   bool by_metis = false;
-  double imbalance = 1; ///< edges of the rank that has most, over the mean
+  double imbalance = 1;             ///< edges of the rank that has most, over the mean
   std::int64_t most = 0, least = 0; ///< edges of a rank
 
   /// Whether it is the order of the scene.

@@ -7,7 +7,7 @@
 #include "tendril/model/scene.hpp"
 
 #include <functional>
-#include <mpi.h>
+#include <petscsys.h> // MPI, whose reductions -log_view counts
 #include <span>
 
 namespace tendril {

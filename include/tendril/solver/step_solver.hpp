@@ -30,8 +30,9 @@ public:
   /// \param share what this rank has of a larger scene
   PetscErrorCode setUp(IncrementalPotential &potential, Coupling coupling = Coupling::none, const Share &share = {});
   /// Minimises the potential of the step, on all ranks. The potential's iterate is the answer when `report` says
-  /// converged; iterations are the most of any block. After a failure the report is that of the first block that failed. In statics, where fine rods take many iterations, they begin again from the
-  /// answer with fewer edges (solveCoarse). \param guess where to begin instead of at the start state
+  /// converged; iterations are the most of any block. After a failure the report is that of the first block that
+  /// failed. In statics, where fine rods take many iterations, they begin again from the answer with fewer edges
+  /// (solveCoarse). \param guess where to begin instead of at the start state
   PetscErrorCode solve(const State &start, const Step &step, NewtonReport *report, Seek seek = Seek::minimum,
                        const Guess *guess = nullptr);
   bool coarse_first = false; ///< whether fine rods begin from fewer edges without a try of their own
