@@ -174,7 +174,9 @@ PetscErrorCode measure(const Request &request, Measured *m) {
   PetscCall(makeScene(request, &scene, &settings));
   PetscCall(simulation.setUp(std::move(scene), settings));
   PetscCall(simulation.solver.rehearse(simulation.state, TimeLoop::stepOf(settings, simulation.state, settings.dt)));
-  PetscCall(refuseUnknownOptions());
+  std::vector<std::string> unused;
+  PetscCall(unusedOptions(&unused));
+  if (!unused.empty()) refuseUnused(unused.front());
   m->rods = int(simulation.scene.rods.size());
   m->edges = 0;
   int longest = 0;

@@ -372,20 +372,20 @@ std::vector<int> edgesAsked(const Scene &scene, const Options &o) {
   return edges;
 }
 
-PetscErrorCode refuseUnknownOptions() {
+PetscErrorCode unusedOptions(std::vector<std::string> *unused) {
   PetscInt n;
   char **names, **values;
   PetscFunctionBeginUser;
   PetscCall(PetscOptionsLeftGet(nullptr, &n, &names, &values));
-  std::string unknown;
-  for (PetscInt i = 0; i < n; ++i) {
-    const std::string name = names[i];
-    const bool late = std::any_of(std::begin(late_options), std::end(late_options),
-                                  [&](const char *p) { return name.rfind(p, 0) == 0; });
-    if (!late && unknown.empty()) unknown = name;
-  }
+  for (PetscInt i = 0; i < n; ++i)
+    if (const std::string name = names[i]; std::none_of(std::begin(late_options), std::end(late_options),
+                                                        [&](const char *p) { return name.rfind(p, 0) == 0; }))
+      unused->push_back(name);
   PetscCall(PetscOptionsLeftRestore(nullptr, &n, &names, &values));
-  if (unknown.empty()) PetscFunctionReturn(0);
+  PetscFunctionReturn(0);
+}
+
+void refuseUnused(const std::string &unknown) {
   std::vector<std::string> known{"snes_monitor", "log_view", "options_file"};
   for (const Key &key : keys)
     if (key.isOption()) known.emplace_back(key.name());

@@ -110,36 +110,38 @@ void makeReady(Scene scene, const Options &o, Prepared &prepared) {
   const Team world = Team::world();
   const bool path = !o.loop.dynamic && o.loop.continuation == Continuation::arclength;
   const Partition parts = partition(scene, path ? 1 : world.size(), o.partition);
-  prepared.team = world.first(parts.ranks);
-  if (world.size() > 1) {
-    const std::vector<std::string> lines = describe(parts, scene, world.size());
-    if (!path) prepared.notes.insert(prepared.notes.end(), lines.begin(), lines.end());
-    if (path)
-      prepared.notes.push_back("warning: with -continuation arclength all rods share one load factor and run on one "
-                               "rank; the other " +
-                               std::to_string(world.size() - 1) + " have nothing to do");
+  const Team &team = prepared.team = world.first(parts.ranks);
+  prepared.ranks.clear();
+  if (!world.isAlone() && path)
+    prepared.ranks = {"warning: with -continuation arclength all rods share one load factor and run on one rank; the "
+                      "other " +
+                      std::to_string(world.size() - 1) + " have nothing to do"};
+  else if (!world.isAlone())
+    prepared.ranks = describe(parts, scene, world.size());
+  Share share;
+  Simulation *run = nullptr;
+  if (!team.isEmpty()) {
+    prepared.slice = Slice(scene, parts, team);
+    prepared.described.reset();
+    run = (prepared.run = std::make_unique<Simulation>()).get();
+    if (!prepared.slice.isAll()) {
+      share = {team, parts.blocksOf(team.rank()), parts.placesOf(team.rank())};
+      guarded([&] { return run->prepare(prepared.slice.sceneOf(scene), o.loop, team); });
+    }
   }
-  if (prepared.team.isEmpty()) return;
-  const Team &team = prepared.team;
-  prepared.slice = Slice(scene, parts, team);
-  prepared.described.reset();
-  Simulation &run = *(prepared.run = std::make_unique<Simulation>());
-  if (prepared.slice.isAll())
-    guarded([&] { return run.setUp(std::move(scene), o.loop); });
-  else {
-    Share share{team, parts.blocksOf(team.rank()), parts.placesOf(team.rank())};
-    guarded([&] { return run.prepare(prepared.slice.sceneOf(scene), o.loop, team); });
-    team.together([&] {
-      guarded([&] { return run.setUpSolver(o.loop, share); });
-      if (!team.leads()) return;
-      prepared.described = std::make_unique<Simulation>();
-      prepared.described->describe(std::move(scene), o.loop.dynamic);
-    });
-  }
-  team.together([&] {
+  world.together([&] { // ranks without rods hear of mistakes, too
+    if (!run) return;
+    if (prepared.slice.isAll()) return guarded([&] { return run->setUp(std::move(scene), o.loop); });
+    guarded([&] { return run->setUpSolver(o.loop, share); });
+    if (!team.leads()) return;
+    prepared.described = std::make_unique<Simulation>();
+    prepared.described->describe(std::move(scene), o.loop.dynamic);
+  });
+  world.together([&] {
+    if (!run) return;
     if (team.leads() && !prepared.whole().scene.colliders.empty() && o.restart.empty())
       refuseOverlaps(prepared.whole());
-    guarded([&] { return run.solver.rehearse(run.state, TimeLoop::stepOf(o.loop, run.state, o.loop.dt)); });
+    guarded([&] { return run->solver.rehearse(run->state, TimeLoop::stepOf(o.loop, run->state, o.loop.dt)); });
   });
 }
 
@@ -224,9 +226,7 @@ void meetAccuracy(Prepared &prepared, Options &o, Choice *choice) {
   o.loop.dt = steps[0];
   o.loop.dt_rtol = steps[1];
   o.loop.dt_atol = steps[2];
-  const std::vector<std::string> notes = prepared.notes;
   makeReady(remesh(prepared.written, prepared.drawings, choice->edges), o, prepared);
-  prepared.notes.insert(prepared.notes.begin(), notes.begin(), notes.end());
 }
 
 } // namespace tendril

@@ -158,6 +158,20 @@ void tellStop(const State &state, const Options &o, int exit_code, const std::st
   progress.say(line.str());
 }
 
+/// The first option that no rank has asked for: not all have the same solvers.
+PetscErrorCode findUnused(const Team &team, std::string *unused) {
+  PetscFunctionBeginUser;
+  std::vector<std::string> mine;
+  PetscCall(unusedOptions(&mine));
+  std::string names;
+  for (const std::string &name : mine) names += name + '\n';
+  team.share(names);
+  std::istringstream lines(names);
+  for (std::string name; std::getline(lines, name);)
+    if (team.all(std::find(mine.begin(), mine.end(), name) != mine.end()) && unused->empty()) *unused = name;
+  PetscFunctionReturn(0);
+}
+
 /// What a run has before its first step, on the leading rank.
 struct Begun {
   std::optional<OutputFolder> folder;
@@ -182,7 +196,8 @@ bool begin(int argc, char **argv, const Options &o, Prepared &prepared, StepCont
   for (const std::string &line : told) progress.say(line);
   std::istringstream groups(groupsText(whole.scene));
   for (std::string line; std::getline(groups, line);) progress.say(line);
-  for (const std::string &note : prepared.notes) progress.say(note);
+  for (const auto *lines : {&prepared.notes, &prepared.ranks})
+    for (const std::string &line : *lines) progress.say(line);
   for (const std::string &line : out->choice.lines) progress.log(line);
   return true;
 }
@@ -247,18 +262,29 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   prepare(prepared, o);
   if (o.help) PetscFunctionReturn(0);
   Begun begun;
+  std::string unknown;
+  if (!prepared.team.isEmpty()) PetscCall(findUnused(prepared.team, &unknown)); // others have asked for none
   world.together([&] {
-    if (!prepared.team.isEmpty()) (void)refuseUnknownOptions(); // others have asked for none
+    if (!unknown.empty()) refuseUnused(unknown);
     if (!world.leads()) return;
     begun.folder.emplace(o.output_dir);
     refuseToReplaceInputs(*begun.folder, files, prepared.source);
   });
   if (o.accuracy) meetAccuracy(prepared, o, &begun.choice);
   const StopRequest request(start, o.time_limit, world.leads()); // before, nothing is written: a signal ends at once
-  if (!prepared.team.isEmpty()) PetscCall(runPrepared(prepared, argc, argv, o, request, begun, exit_code));
+  std::string mistake;
+  try {
+    if (!prepared.team.isEmpty()) PetscCall(runPrepared(prepared, argc, argv, o, request, begun, exit_code));
+  } catch (const SceneError &e) {
+    if (!prepared.team.isAlone() && !dynamic_cast<const AgreedError *>(&e)) throw; // others wait for this rank
+    mistake = e.what();
+    *exit_code = e.exitCode();
+  }
   double code = *exit_code; // ranks without rods wait here
   world.share({&code, 1});
+  world.share(mistake);
   *exit_code = int(code);
+  if (!mistake.empty()) throw AgreedError(mistake, *exit_code);
   PetscFunctionReturn(0);
 }
 

@@ -87,10 +87,15 @@ std::vector<std::int64_t> loads(const std::vector<std::int64_t> &weight, const s
   return of_rank;
 }
 
-std::int64_t edgesOf(const Scene &scene, const Partition &p, const Block &block) {
-  std::int64_t edges = 0;
-  for (int k = block.rods.begin; k < block.rods.end; ++k) edges += scene.rods[p.order[k]].edges();
-  return edges;
+/// Edges of each rod, and what its couplings weigh.
+std::vector<std::int64_t> workOfRods(const Scene &scene) {
+  std::vector<std::int64_t> work;
+  for (const Rod &rod : scene.rods) work.push_back(rod.edges());
+  for (const Junction &j : scene.junctions)
+    for (const Junction::Member &m : j.members) work[m.rod] += coupling_edges;
+  for (const Constraint &c : scene.constraints)
+    if (c.isTie()) work[c.rod] += coupling_edges;
+  return work;
 }
 
 } // namespace
@@ -164,22 +169,25 @@ Partition partition(const Scene &scene, int ranks, PartitionKind kind) {
   }
   p.blocks = tendril::blocksOf(edges, island_end);
   p.ranks = std::min(ranks, int(p.blocks.size()));
-  std::vector<std::int64_t> weight;
-  for (const Block &b : p.blocks) weight.push_back(edgesOf(scene, p, b));
-  p.owner = dealContiguously(weight, p.ranks);
+  const std::vector<std::int64_t> of_rods = workOfRods(scene);
+  for (const Block &b : p.blocks) {
+    p.work.push_back(0);
+    for (int k = b.rods.begin; k < b.rods.end; ++k) p.work.back() += of_rods[p.order[k]];
+  }
+  p.owner = dealContiguously(p.work, p.ranks);
   auto mostOf = [&](const std::vector<int> &owner) {
-    const std::vector<std::int64_t> of_rank = loads(weight, owner, p.ranks);
+    const std::vector<std::int64_t> of_rank = loads(p.work, owner, p.ranks);
     return *std::max_element(of_rank.begin(), of_rank.end());
   };
-  const std::int64_t all = std::accumulate(weight.begin(), weight.end(), std::int64_t(0));
+  const std::int64_t all = std::accumulate(p.work.begin(), p.work.end(), std::int64_t(0));
   auto imbalanceOf = [&](const std::vector<int> &owner) { return double(mostOf(owner)) * p.ranks / double(all); };
   if (p.ranks > 1 && kind != PartitionKind::contiguous &&
       (kind == PartitionKind::metis || imbalanceOf(p.owner) > even)) {
-    const std::vector<int> owner = dealByMetis(weight, p.ranks);
+    const std::vector<int> owner = dealByMetis(p.work, p.ranks);
     p.by_metis = !owner.empty() && (kind == PartitionKind::metis || mostOf(owner) < mostOf(p.owner));
     if (p.by_metis) p.owner = owner;
   }
-  const std::vector<std::int64_t> of_rank = loads(weight, p.owner, p.ranks);
+  const std::vector<std::int64_t> of_rank = loads(p.work, p.owner, p.ranks);
   p.most = *std::max_element(of_rank.begin(), of_rank.end());
   p.least = *std::min_element(of_rank.begin(), of_rank.end());
   p.imbalance = imbalanceOf(p.owner);
@@ -190,9 +198,11 @@ std::vector<std::string> describe(const Partition &p, const Scene &scene, int ra
   constexpr double large = 1.1; // of a rank's share
   std::vector<std::string> lines;
   std::ostringstream line;
-  line << "ranks: " << p.ranks << ", " << p.blocks.size() << " blocks of rods "
-       << (p.by_metis ? "by METIS" : "one behind the other") << ", " << p.least << " to " << p.most
-       << " edges a rank, imbalance " << std::setprecision(3) << p.imbalance << ", no coupling cut";
+  line << "ranks: " << p.ranks << ", " << p.blocks.size()
+       << (p.blocks.size() == 1 ? " block of rods " : " blocks of rods ")
+       << (p.by_metis ? "by METIS" : "one behind the other") << ", " << p.least << " to " << p.most << " edges a rank"
+       << (scene.isJoined() ? " (a coupling counts as " + std::to_string(coupling_edges) + ")" : "") << ", imbalance "
+       << std::setprecision(3) << p.imbalance << ", no coupling cut";
   lines.push_back(line.str());
   if (p.ranks < ranks)
     lines.push_back("warning: " + std::to_string(ranks - p.ranks) + " of " + std::to_string(ranks) +
@@ -200,12 +210,10 @@ std::vector<std::string> describe(const Partition &p, const Scene &scene, int ra
                     (p.blocks.size() == 1 ? "is 1 block of rods that are"
                                           : "are " + std::to_string(p.blocks.size()) + " blocks of rods that are") +
                     " solved together; start fewer");
-  std::int64_t all = 0;
-  for (const Rod &rod : scene.rods) all += rod.edges();
-  const double share = double(all) / p.ranks;
+  const double share = double(std::accumulate(p.work.begin(), p.work.end(), std::int64_t(0))) / p.ranks;
   int told = 0;
   for (const Block &b : p.blocks) {
-    const std::int64_t edges = edgesOf(scene, p, b);
+    const std::int64_t edges = p.work[std::size_t(&b - p.blocks.data())];
     const int rods = b.rods.end - b.rods.begin;
     if (p.ranks == 1 || double(edges) <= large * share || (rods > 1 && !b.joined) || ++told > 3) continue;
     std::ostringstream warning;

@@ -1,9 +1,12 @@
 #include "tendril/layout/team.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <limits>
+#include <thread>
 
 namespace tendril {
 namespace {
@@ -24,6 +27,20 @@ void reduce(void *in, void *in_out, int *count, MPI_Datatype *type) {
       if (a > b || std::isnan(a)) to[n] = from[n];
     }
     for (std::int64_t n = 2 + numbers; n < 2 + numbers + whole; ++n) to[n] += from[n];
+  }
+}
+
+/// Waits for the other ranks. What takes longer than a step in the cache does is slept through: ranks that wait must
+/// not take a core from one that works, and giving way (sched_yield) does not always do.
+void finish(MPI_Request request) {
+  using Clock = std::chrono::steady_clock;
+  constexpr auto awake = std::chrono::microseconds(200), longest = std::chrono::microseconds(1000);
+  auto nap = std::chrono::microseconds(20);
+  const Clock::time_point begin = Clock::now();
+  for (int done = 0; MPI_Test(&request, &done, MPI_STATUS_IGNORE), !done;) {
+    if (Clock::now() - begin < awake) continue;
+    std::this_thread::sleep_for(nap);
+    nap = std::min(2 * nap, longest);
   }
 }
 
@@ -95,7 +112,9 @@ void Team::combine(Tally &tally) const {
   MPI_Datatype type;
   MPI_Type_contiguous(int(buffer.size()), MPI_INT64_T, &type);
   MPI_Type_commit(&type);
-  MPI_Allreduce(MPI_IN_PLACE, buffer.data(), 1, type, operation, comm_);
+  MPI_Request request;
+  MPI_Iallreduce(MPI_IN_PLACE, buffer.data(), 1, type, operation, comm_, &request);
+  finish(request);
   MPI_Type_free(&type);
   const std::int64_t *next = buffer.data() + 2;
   for (const Tally::Greatest &g : tally.greatest_) {
@@ -120,14 +139,19 @@ bool Team::all(bool mine) const { return !any(!mine); }
 
 void Team::share(std::string &text, int from) const {
   if (isAlone()) return;
-  std::uint64_t length = text.size();
-  MPI_Bcast(&length, 1, MPI_UINT64_T, from, comm_);
-  text.resize(length);
-  MPI_Bcast(text.data(), int(length), MPI_CHAR, from, comm_);
+  double length = double(text.size());
+  share({&length, 1}, from);
+  text.resize(std::size_t(length));
+  MPI_Request request;
+  MPI_Ibcast(text.data(), int(text.size()), MPI_CHAR, from, comm_, &request);
+  finish(request);
 }
 
 void Team::share(std::span<double> numbers, int from) const {
-  if (!isAlone()) MPI_Bcast(numbers.data(), int(numbers.size()), MPI_DOUBLE, from, comm_);
+  if (isAlone()) return;
+  MPI_Request request;
+  MPI_Ibcast(numbers.data(), int(numbers.size()), MPI_DOUBLE, from, comm_, &request);
+  finish(request);
 }
 
 std::string Team::textOfFirst(double order, const std::string &mine) const {
@@ -169,8 +193,14 @@ std::vector<double> Team::gather(std::span<const double> mine, const std::vector
     places.push_back(int(all.size()));
     all.resize(all.size() + std::size_t(count));
   }
-  MPI_Gatherv(mine.data(), int(mine.size()), MPI_DOUBLE, all.data(), counts.data(), places.data(), MPI_DOUBLE, 0,
-              comm_);
+  if (all.size() > std::size_t(std::numeric_limits<int>::max()))
+    throw SceneError(
+        "a field of " + std::to_string(all.size()) +
+        " numbers is more than one rank can gather; write fewer fields (-output_fields) or split the scene");
+  MPI_Request request;
+  MPI_Igatherv(mine.data(), int(mine.size()), MPI_DOUBLE, all.data(), counts.data(), places.data(), MPI_DOUBLE, 0,
+               comm_, &request);
+  finish(request);
   return all;
 }
 
@@ -181,8 +211,10 @@ void Team::scatter(const std::vector<double> &all, const std::vector<int> &count
   }
   std::vector<int> places{0};
   for (const int count : counts) places.push_back(places.back() + count);
-  MPI_Scatterv(all.data(), counts.data(), places.data(), MPI_DOUBLE, mine.data(), int(mine.size()), MPI_DOUBLE, 0,
-               comm_);
+  MPI_Request request;
+  MPI_Iscatterv(all.data(), counts.data(), places.data(), MPI_DOUBLE, mine.data(), int(mine.size()), MPI_DOUBLE, 0,
+                comm_, &request);
+  finish(request);
 }
 
 void Team::abort(int exit_code) const {

@@ -22,8 +22,8 @@ PetscErrorCode StepSolver::setUp(IncrementalPotential &potential, Coupling coupl
   PetscFunctionBeginUser;
   potential_ = &potential;
   share_ = share;
-  std::vector<RodSet> blocks = share.blocks;
-  if (blocks.empty() && coupling == Coupling::none) blocks = blocksOf(potential.dofs());
+  std::vector<RodSet> blocks;
+  if (coupling == Coupling::none) blocks = share.blocks.empty() ? blocksOf(potential.dofs()) : share.blocks;
   if (blocks.size() > 1) {
     PetscCall(setUpBlocks(blocks));
     if (blocks_.size() == blocks.size()) PetscFunctionReturn(0);

@@ -140,7 +140,9 @@ def mistakes(tmp):
             ([elastica, "--observe", "tip=positon[-1,-1]"], "position"), ([elastica, "--observe", "tip=position[-1,99999]"], "tip=position[-1,99999]"),
             ([elastica, "--zip", "dt,t_end", "-dt", "1,2"], "t_end does not vary"),
             ([elastica, "--zip", "dt,t_end", "-dt", "1,2", "-t_end", "1,2,3"], "-t_end has 3"), ([elastica, "-j", "0"], "whole number"),
-            ([elastica, "--mpi", "two"], "--mpi two"), ([elastica, "--part", "3/2"], "K from 1 to N"), ([elastica, "--slurm", "-1"], "number of jobs"),
+            ([elastica, "--mpi", "two"], "--mpi two"), ([elastica, "--part", "3/2"], "K from 1 to N"), ([elastica, "--slurm", "-1"], "number of jobs"), ([elastica, "--slurm", "2", "--part", "1/2"], "take --part away"),
+            ([elastica, "--observe", "tip=position[-1,-1]", "--exact", "tip=nan,0,0"], "NAME=NUMBERS"), ([elastica, "-rod_edgess", "3"], "-rod_edgess"),
+            ([elastica, "--part", "1/2", "-rod_edges", "8,9", "--observe", "tip=positon[-1,-1]"], "positon"),
             ([elastica, "--exact", "tip=1"], "that of an --observe"), ([elastica, "--observe", "tip=position[-1,-1]", "--exact", "tip=1"], "3 numbers"),
             ([elastica, "--outt", "x"], "--outt"), ([elastica, "-output_dir", "x"], "not for a sweep"), ([elastica, "other.yaml"], "other.yaml")):
         text = run(1, *words, "--out", tmp + "/e")

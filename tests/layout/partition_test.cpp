@@ -106,7 +106,7 @@ TEST(Partition, TellsWhatWaits) {
   const std::vector<std::string> lines_ = describe(partition(scene, 2, PartitionKind::automatic), scene, 2);
   ASSERT_EQ(lines_.size(), 2u);
   EXPECT_EQ(lines_[0].find("ranks: 2, "), 0u) << lines_[0];
-  EXPECT_NE(lines_[1].find("rod 'r0' of 5000 edges is more than a rank's share of 4300"), std::string::npos)
+  EXPECT_NE(lines_[1].find("rod 'r0' of 5000 edges is more than a rank's share of 4400"), std::string::npos)
       << lines_[1];
   const Scene small = lines({10});
   const std::vector<std::string> idle = describe(partition(small, 4, PartitionKind::automatic), small, 4);

@@ -183,8 +183,14 @@ def group_islands():
     for method in ("euler", "bdf2"):
         same(f"islands_{method}", "-scene", path, "-integrator", method, "-output_fields", "all,reaction,constraint_force")
     same("islands_metis", "-scene", path, "-partition", "metis")
+    # Only the island that MUMPS takes asks for its options.
+    knit = open(path).read() + "  - {name: ring, type: pin, rod: b1, vertex: last, to: {rod: b1, vertex: 2}, stiffness: 5}\n"
+    launch(2, "-scene", write("knit", knit), "-output_dir", "knit")
+    # On a path all rods are one system, in whatever order their islands are.
+    still = re.sub(r", motion: {[^}]*}}", "}", open(path).read()).replace("mode: dynamic, dt: 0.005, t_end: 0.05", "mode: static, load_steps: 4")
+    same("islands_path", "-scene", write("islands_path", still), "-continuation", "arclength", "-arclength_steps", 6, ranks=(1, 2), checkpoint=False, says="6 steps")
     out, _ = launch(4, "-scene", path, "-partition", "metis", "-output_dir", "islands_log")
-    line = re.search(r"^ranks: 4, (\d+) blocks of rods by METIS, \d+ to \d+ edges a rank, imbalance ([0-9.]+), no coupling cut$", out, re.M)
+    line = re.search(r"^ranks: 4, (\d+) blocks of rods by METIS, \d+ to \d+ edges a rank \(a coupling counts as 100\), imbalance ([0-9.]+), no coupling cut$", out, re.M)
     assert line and int(line[1]) >= 13 and float(line[2]) < 1.2, out
 
 
@@ -237,6 +243,16 @@ def group_failures():
             out, _ = launch(2, option)
             one, _ = launch(1, option)
             assert out == one and re.search(first, out, re.M), f"{option} on 2 ranks: {out[:200]}"
+    two_blocks = write("two_blocks", "gravity: [0, -9.81, 0]\nsimulation: {mode: dynamic, dt: 0.005, t_end: 0.02}\nrods:\n" +
+                       rods(random.Random(6), 20, (80, 90)) + "supports:\n  - {rod: all, vertex: 0, type: clamp}\n")
+    inside = write("inside", open(two_blocks).read() + "colliders:\n  - {name: ball, sphere: {radius: 0.1}}\n")
+    for options, says in (((two_blocks, "-pc_type", "nothing"), "setting up"), ((inside,), "deep in collider 'ball'"), ((two_blocks, "-mat_mumps_icntl_14", 50), "mat_mumps_icntl_14")):
+        out, err = launch(4, "-scene", *options, code=1)
+        assert len([line for line in err.splitlines() if line.startswith("tendril:")]) == 1 and says in err, out + err
+    for path in (two_blocks, source + "/data/scenes/helix.yaml"):  # some ranks have no rods, and still end
+        out, err = launch(4, "-scene", path, "-restart", "none.h5", code=1)
+        assert len([line for line in err.splitlines() if line.startswith("tendril:")]) == 1 and "none.h5" in err, out + err
+    same("few", "-scene", two_blocks)
     out, _ = launch(4, "-scene", source + "/data/scenes/helix.yaml", "-t_end", 0.02, "-output_dir", "idle")
     assert "3 of 4 ranks have nothing to do" in out and "ranks: 1" in out, out
     print("failures: the same, told once", flush=True)

@@ -54,8 +54,10 @@ void resolve(const RunSettings &scene, Options &options);
 /// The edges of every rod, those of -rod_edges in place of the scene's. \throws SceneError
 std::vector<int> edgesAsked(const Scene &scene, const Options &options);
 
-/// Refuses options that nobody has asked for; call when the solvers are set up. \throws SceneError
-PetscErrorCode refuseUnknownOptions();
+/// Options that nobody has asked for, in the order of the command line; call when the solvers are set up.
+PetscErrorCode unusedOptions(std::vector<std::string> *unused);
+/// \throws SceneError with what may have been meant
+[[noreturn]] void refuseUnused(const std::string &option);
 
 /// Writes all that is in force, PETSc's options included, as YAML, and returns what it wrote.
 std::string writeOptionsFile(const std::string &path, const Options &options, const Provenance &provenance,

@@ -15,7 +15,7 @@ struct Prepared {
   std::unique_ptr<Simulation> described; ///< the whole scene, where the leading rank has a part only
   Slice slice;
   SceneSource source;
-  std::vector<std::string> notes;
+  std::vector<std::string> notes, ranks; ///< to be told: of the scene; of how it is dealt out
   Scene written;
   std::vector<Drawing> drawings;
 

@@ -9,7 +9,7 @@ namespace tendril {
 
 /// The rank that a launcher says a process has, before MPI has started; 0 without one.
 inline int launchedRank() {
-  for (const char *rank : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"})
+  for (const char *rank : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"})
     if (const char *text = std::getenv(rank)) return std::atoi(text);
   return 0;
 }

@@ -33,8 +33,9 @@ struct Partition {
   std::vector<int> owner;    ///< rank of each block
   int ranks = 1;             ///< that have any; no more than there are blocks
   bool by_metis = false;
-  double imbalance = 1;             ///< edges of the rank that has most, over the mean
-  std::int64_t most = 0, least = 0; ///< edges of a rank
+  std::vector<std::int64_t> work;   ///< of each block, in edges; a coupling counts as `coupling_edges`
+  std::int64_t most = 0, least = 0; ///< work of a rank
+  double imbalance = 1;             ///< that of the rank that has most, over the mean
 
   /// Whether it is the order of the scene.
   bool isOrdered() const;
@@ -44,6 +45,10 @@ struct Partition {
   /// Numbers of these blocks among all.
   std::vector<double> placesOf(int rank) const;
 };
+
+/// Work of a junction's member or of a pin between vertices, in edges by themselves: from 30 for rods that meet in one
+/// node to 350 in a net of 20 x 20 rods (docs/performance.md).
+inline constexpr int coupling_edges = 100;
 
 /// \param ranks that could take part
 Partition partition(const Scene &scene, int ranks, PartitionKind kind);
