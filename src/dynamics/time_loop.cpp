@@ -107,6 +107,7 @@ void TimeLoop::measure(const State &state, const State &next, Attempt *now) {
                                        potential.iterate(), state.time, next.time));
   }
   now->stops = stops && stops();
+  if (solver_.team().isAlone()) return;
   Tally tally;
   for (ExactSum &energy : now->energy.sums) tally.sum(energy);
   now->work.tally(tally);
