@@ -74,9 +74,9 @@ def told(text):
     """Lines of a run that do not say how it was made."""
     lines = []
     for line in text.splitlines():
-        if re.match(r"(ranks: |warning: .* of .* ranks have nothing|warning: with -continuation|warning: the island|.*tendril |goes on from|working for)", line):
+        if re.match(r"(ranks: |warning: .* of .* ranks have nothing|warning: with -continuation|warning: the island|.*tendril |goes on from|working for|  memory )", line):
             continue
-        lines.append(re.sub(r"[0-9.e+-]+ s, results in \S+|[0-9.e+-]+ s left", "", line))
+        lines.append(re.sub(r"[0-9.e+-]+ s, results in \S+|[0-9.e+-]+ s left|took [0-9.e+-]+ s", "", line))
     return lines
 
 
