@@ -20,7 +20,7 @@ import numpy as np
 
 FORMATS = (1, 2)
 PLACES = ("vertices", "edges", "cells")
-ROWS = ("supports", "constraints", "colliders")  # of fields that are not of rods
+ROWS = ("supports", "constraints", "colliders", "bodies")  # of fields that are not of rods
 ON_DEMAND = ("curvature", "twist", "strain_energy_density", "force", "moment", "reaction", "reaction_moment",
              "constraint_deviation", "constraint_force", "contact_force", "collider_force", "collider_moment", "position_low")
 
@@ -101,7 +101,8 @@ def _open(path):
 
 
 class Field:
-    """A field of all rods, at `place`: vertices, edges, cells, supports or constraints; indices read from the file what they ask for.
+    """A field of all rods, at `place`: vertices, edges, cells, supports, constraints, colliders or bodies; indices read
+    from the file what they ask for.
 
     field[frame], field[first:last, vertex], numpy.asarray(field). Shape: (frames, n), or (frames, n, components).
     """
@@ -247,9 +248,42 @@ class Constraint:
     place: int
 
 
+@dataclass(frozen=True)
+class Attachment:
+    """A vertex of a rod that is a point of a body. type: weld, which holds the rod's direction, too, or pin. `vertex`
+    counts over all rods, `rod_vertex` on its own."""
+
+    name: str
+    type: str
+    body: str
+    rod: str
+    rod_vertex: int
+    vertex: int
+
+
+class Things(list):
+    """Bodies or colliders by number or name."""
+
+    names = property(lambda self: [thing.name for thing in self])
+
+    def __getitem__(self, key):
+        if not isinstance(key, str):
+            return super().__getitem__(key)
+        for thing in self:
+            if thing.name == key:
+                return thing
+        raise TendrilError(f"nothing is called '{key}'; there are: {_listed(self.names)}")
+
+
 class Thing:
-    """A body or a collider. shape: plane, sphere, box, capsule, cylinder, tube or mesh, with its parameters (k,); of a mesh `vertices`
-    (n, 3) [m] and `triangles` (m, 3), otherwise None; mass [kg] and inertia (3, 3) [kg m^2] of bodies, or None."""
+    """A body or a collider. shape: plane, sphere, box, capsule, cylinder, tube, mesh or none, with its parameters (k,)
+    [m]: of a box three half edges, of others radii, then the half length; of a mesh `vertices` (n, 3) [m] and
+    `triangles` (m, 3), otherwise None.
+
+    Of bodies, with the masses of the rods that are tied to them: mass [kg]; centre (3,) [m], that of mass, as drawn;
+    inertia (3, 3) [kg m^2] about it as drawn, in axes of the world. None in files without, and of colliders.
+
+    Frames are numbers (-1 is the last) or slices."""
 
     def __init__(self, trajectory, group, index):
         self._t, self._kind, self.index = trajectory, {"bodies": "body", "colliders": "collider"}[group], index
@@ -259,19 +293,42 @@ class Thing:
         self.name = _texts(data["name"])[index] if "name" in data else f"{self._kind}{index}"
         parameters = data["parameters"][index] if "parameters" in data else np.zeros(0)
         self.parameters = parameters[~np.isnan(parameters)]
-        self.mass, self.inertia = (data[key][index] if key in data else None for key in ("mass", "inertia"))
+        self.mass, self.inertia, self.centre = (data[key][index] if key in data else None
+                                                for key in ("mass", "inertia", "centre"))
         mesh = data.get(f"meshes/{index}")
         self.vertices, self.triangles = (mesh[key][:] if mesh else None for key in ("vertices", "triangles"))
 
     def pose(self, frame=-1):
-        """Position (3,) [m] and rotation (4,), a unit quaternion whose first component is the real one."""
+        """Position (3,) [m] of the origin and rotation (4,) from its own axes to the world's, a unit quaternion whose
+        first component is the real one; with a slice of frames, these come first."""
         return self._moving("position", np.zeros(3), frame), self._moving("rotation", np.array([1.0, 0, 0, 0]), frame)
+
+    def position(self, frame=-1):
+        """Of the origin, (3,) [m]."""
+        return self.pose(frame)[0]
+
+    def rotation(self, frame=-1):
+        """A unit quaternion (4,), w x y z."""
+        return self.pose(frame)[1]
+
+    def axes(self, frame=-1):
+        """The rotation as a matrix (3, 3): its columns are the own axes in the world, so that position + axes @ x is
+        where the point x of a body or collider is."""
+        w, x, y, z = np.moveaxis(self.rotation(frame), -1, 0)
+        rows = [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]
+        return np.stack([np.stack(row, -1) for row in rows], -2)
 
     def _moving(self, key, rest, frame):
         state, at_rest = f"state/{self._kind}_{key}", f"{self._group}/{key}"
+        frames = self._t._frame(frame)
         if state in self._t._file:
-            return self._t._dataset(state)[self._t._frame(frame), self.index]
-        return self._t._dataset(at_rest)[self.index] if at_rest in self._t._file else rest
+            return self._t._dataset(state)[frames, self.index]
+        if self._kind == "body":  # it moves, and -output_fields has left out where
+            self._t.field(f"body_{key}")
+        value = self._t._dataset(at_rest)[self.index] if at_rest in self._t._file else rest
+        return np.tile(value, (len(self._t.time[frames]), 1)) if isinstance(frames, slice) else value
 
     def __repr__(self):
         return f"<{self._kind} '{self.name}', {self.shape}>"
@@ -322,8 +379,15 @@ class Moment:
         before = at(self._before)
         if self._weight == 0 or name == "turns":
             return before
+        if name in ("body_rotation", "collider_rotation"):
+            return self._between_turns(before, at(self._after))
         value = (1 - self._weight) * before + self._weight * at(self._after)
         return _unit_vectors(value, before) if name == "director" else value
+
+    def _between_turns(self, before, after):
+        same = np.sum(before * after, axis=-1, keepdims=True) >= 0  # a rotation is two quaternions
+        after = np.where(same, after, -after)
+        return _unit_vectors((1 - self._weight) * before + self._weight * after, before)
 
     def _things(self, things):
         for thing in things:
@@ -332,8 +396,7 @@ class Moment:
 
     def _pose(self, thing):
         (x0, q0), (x1, q1) = Thing.pose(thing, self._before), Thing.pose(thing, self._after)
-        w, q1 = self._weight, q1 if q0 @ q1 >= 0 else -q1  # a rotation is two quaternions
-        return (1 - w) * x0 + w * x1, _unit_vectors((1 - w) * q0 + w * q1, q0)
+        return (1 - self._weight) * x0 + self._weight * x1, self._between_turns(q0, q1)
 
 
 class Options(dict):
@@ -352,8 +415,9 @@ class Trajectory:
     """A trajectory.h5, given by its path or that of its folder.
 
     path, format_version, attributes (those of the file: command line, version, ...), gravity (3,) [m/s^2];
-    rods, supports, constraints, bodies, colliders; scene: its text, or None; scene_files: texts that it names, by path as written;
-    options: Options. A frame counts once it is complete. What a run has added since is seen after refresh().
+    rods, supports, constraints, bodies, attachments, colliders; scene: its text, or None; scene_files: texts that it
+    names, by path as written; options: Options. A frame counts once it is complete. What a run has added since is seen
+    after refresh().
     """
 
     def __init__(self, path):
@@ -416,6 +480,15 @@ class Trajectory:
             for name, kind, rod, place in zip(*(_texts(f["constraints/" + n]) for n in ("name", "type")), *columns):
                 start = self._static["vertices" if kind == "pin" else "edges"][rod]
                 self.constraints.append(Constraint(name, kind, self._static["name"][rod], place - start))
+        self.attachments = []
+        if "bodies/attachment_body" in f:
+            starts, bodies = self._static["vertices"], _texts(f["bodies/name"])
+            texts = (_texts(f["bodies/attachment_" + n]) for n in ("name", "type"))
+            numbers = (f["bodies/attachment_" + n][:].tolist() for n in ("body", "vertex"))
+            for name, kind, body, vertex in zip(*texts, *numbers):
+                rod = int(np.searchsorted(starts, vertex, side="right")) - 1
+                self.attachments.append(Attachment(name, kind, bodies[body], self._static["name"][rod],
+                                                   vertex - starts[rod], vertex))
         self.scene = _text(f["scene"][()]) if "scene" in f else None
         files = f["scene_files"].values() if "scene_files" in f else ()
         self.scene_files = {_text(data.attrs["path"]): _text(data[()]) for data in files}
@@ -440,7 +513,7 @@ class Trajectory:
 
     def _things(self, group):
         count = len(self._file[group]["shape"]) if group in self._file else 0
-        return [Thing(self, group, k) for k in range(count)]
+        return Things(Thing(self, group, k) for k in range(count))
 
     def _dataset(self, name):
         """A dataset as it is now, to be let go at once: HDF5 keeps one view of a file for all readers of a process,
@@ -537,7 +610,8 @@ class Trajectory:
     def unit(self, name):
         """Unit of a dataset: a field, column of the diagnostics, parameter of the material; 1 of pure numbers.
         Of equal names a field goes first: `diagnostics/twist` is the energy [J]."""
-        groups = ("", "state/", "diagnostics/", "material/", "rods/", "reference/", "critical/", "estimate/")
+        groups = ("", "state/", "diagnostics/", "material/", "rods/", "reference/", "critical/", "estimate/",
+                  "bodies/")
         for path in (group + name for group in groups):
             if isinstance(self._file.get(path), h5py.Dataset):
                 if self.format_version > 1:
@@ -548,22 +622,26 @@ class Trajectory:
         raise TendrilError(f"nothing is called '{name}'; there are: {_listed(names)}")
 
     def to_xarray(self):
-        """An xarray.Dataset of all fields, in memory: dimensions time, vertex, edge, cell; xyz, or axis of pairs."""
+        """An xarray.Dataset of all fields, in memory: dimensions time, vertex, edge, cell, body ...; xyz, or axis of
+        pairs, wxyz of quaternions."""
         try:
             import xarray
         except ImportError:
             raise TendrilError("to_xarray needs xarray: apt-get install python3-xarray") from None
         dimension = {"vertices": "vertex", "edges": "edge", "cells": "cell", "supports": "support",
-                     "constraints": "constraint", "colliders": "collider"}
+                     "constraints": "constraint", "colliders": "collider", "bodies": "body"}
         variables = {}
         for name in self._fields:
             field = self.field(name)
-            components = {1: (), 3: ("xyz",), 2: ("axis",), 6: ("motion",)}[field.shape[2] if field.ndim == 3 else 1]
+            components = {1: (), 3: ("xyz",), 2: ("axis",), 4: ("wxyz",),
+                          6: ("motion",)}[field.shape[2] if field.ndim == 3 else 1]
             variables[name] = ("time", dimension[field.place], *components), field[:], {"units": field.unit}
         coordinates = {"time": ("time", self.time, {"units": self.unit("time")}), "xyz": ["x", "y", "z"]}
         for place in ("vertices", "edges"):
             rods = np.repeat(self._static["name"], np.diff(self._static[place]))
             coordinates[dimension[place] + "_rod"] = dimension[place], rods
+        if len(self.bodies):
+            coordinates["body"] = self.bodies.names
         return xarray.Dataset(variables, coordinates, self.attributes)
 
     def __repr__(self):

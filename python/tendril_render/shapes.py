@@ -204,9 +204,12 @@ def body(shape, parameters, position, quaternion, colour, vertices=None, triangl
 
     parameters [m]: sphere (radius); box (three half lengths); capsule (radius, half length between the centres of its
     ends, along z); cylinder (radius, half length); tube (bore, outer radius, half length), drawn as rings and lines
-    so that one sees what is in it; plane (normal, three numbers; default z), through the position; mesh: vertices and triangles.
+    so that one sees what is in it; plane (normal, three numbers; default z), through the position; mesh: vertices and
+    triangles; none: nothing.
     """
     p, R, at = np.atleast_1d(np.asarray(parameters, float)), rotation(quaternion), np.asarray(position, float)
+    if shape == "none":
+        return Shapes()
     if shape == "plane":
         normal = p[:3] if len(p) >= 3 else np.array([0, 0, 1.0])
         return Shapes(planes=[(at, unit(R @ normal))])
@@ -231,4 +234,4 @@ def body(shape, parameters, position, quaternion, colour, vertices=None, triangl
         return mesh(BOX * p[:3] @ R.T + at, BOX_TRIANGLES, colour)
     if shape == "mesh":
         return mesh(np.asarray(vertices, float) @ R.T + at, triangles, colour)
-    raise ValueError(f"shape {shape}: known are plane, sphere, box, capsule, cylinder, tube and mesh")
+    raise ValueError(f"shape {shape}: known are plane, sphere, box, capsule, cylinder, tube, mesh and none")

@@ -25,6 +25,7 @@ const std::vector<DiagnosticsColumn> &diagnosticsColumns() {
       {"work_supports", "J", [](const D &d) { return d.work.supports + d.work.obstacles; }},
       {"constraint", "J", [](const D &d) { return d.energy.constraint; }},
       {"contact", "J", [](const D &d) { return d.energy.contact; }},
+      {"body_kinetic", "J", [](const D &d) { return d.energy.body_kinetic; }},
       {"contact_gap_min", "m", [](const D &d) { return d.contact_gap_min; }}};
   return columns;
 }

@@ -17,6 +17,10 @@ Slice::Slice(const Scene &whole, const Partition &partition, const Team &team) :
   }
   for (const Junction &j : whole.junctions)
     for (int k = 0; k < j.groups; ++k) parts_[rank_of[j.members.front().rod]].groups.push_back(groups_++);
+  for (const Body &b : whole.bodies) {
+    parts_[rank_of[b.rod]].bodies.push_back(bodies_++);
+    parts_[rank_of[b.rod]].groups.push_back(groups_++);
+  }
   for (const Holder &h : movingHolders(whole)) parts_[rank_of[h.rod]].holders.push_back(holders_++);
   std::vector<std::vector<int>> of_rod(whole.rods.size());
   for (const Holder &h : movingObstacles(whole)) of_rod[h.rod].push_back(holders_++);
@@ -104,7 +108,11 @@ public:
     for (std::size_t n = 0; n < mine.memory.size(); ++n) {
       move(mine.memory[n].vertex, all ? &all->memory[n].vertex : nullptr, &Part::rods, vertices(), nv);
       move(mine.memory[n].edge, all ? &all->memory[n].edge : nullptr, &Part::rods, edges(), ne);
+      move(mine.memory[n].body, all ? &all->memory[n].body : nullptr, &Part::bodies, one, std::size_t(slice_.bodies_));
     }
+    for (auto array : {&State::body_position, &State::body_position_low})
+      move(mine.*array, of(array), &Part::bodies, one, std::size_t(slice_.bodies_));
+    move(mine.body_rate, of(&State::body_rate), &Part::bodies, one, std::size_t(slice_.bodies_));
     moveStrains(own, mine, all);
     moveActions(mine, all);
     if (!mine.contact_stiffness.empty())
@@ -228,7 +236,8 @@ void Slice::spread(const Elements &own, State *part, const Elements *whole, cons
   part->last_dt = facts[2];
   part->dt_before = facts[3];
   const std::size_t nv = part->position.size(), ne = part->director.size(), rods = own.rods.size();
-  part->memory.assign(std::size_t(facts[4]), {std::vector<Vec3>(nv, Vec3::Zero()), std::vector<double>(ne, 0.0)});
+  part->memory.assign(std::size_t(facts[4]), {std::vector<Vec3>(nv, Vec3::Zero()), std::vector<double>(ne, 0.0),
+                                              std::vector<BodyRate>(part->body_rate.size())});
   part->strains.assign(std::size_t(facts[5]) * strainRow(own), 0.0);
   part->support_actions.assign(std::size_t(facts[6]) * 2 * parts_[team_.rank()].holders.size(), Vec3::Zero());
   part->contact_stiffness.assign(facts[7] != 0 ? rods : 0, 0.0);

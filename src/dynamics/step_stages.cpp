@@ -70,13 +70,14 @@ PetscErrorCode TimeLoop::solveStages(const State &start, State *next, Attempt *n
 void TimeLoop::finish(const State &start, double h, RodSet rods, State *next) {
   const IncrementalPotential &potential = solver_.potential();
   const Piece piece(potential.elements(), rods);
-  integrator_->velocity(start, h, stages_).assignTo(piece, next->velocity, next->twist_rate);
+  integrator_->velocity(start, h, stages_).assignTo(piece, *next);
   const std::vector<Combination> memory = integrator_->remembers(start, h, stages_);
   next->memory.resize(memory.size());
   for (std::size_t n = 0; n < memory.size(); ++n) {
     next->memory[n].vertex.resize(start.velocity.size());
     next->memory[n].edge.resize(start.twist_rate.size());
-    memory[n].assignTo(piece, next->memory[n].vertex, next->memory[n].edge);
+    next->memory[n].body.resize(start.body_rate.size());
+    memory[n].assignTo(piece, next->memory[n]);
   }
   for (int r = rods.begin; r < rods.end && !moving_.empty(); ++r)
     for (const int k : moving_of_[r]) {
@@ -178,6 +179,13 @@ TimeLoop::StepError TimeLoop::stepError(const State &start, double h) const {
     for (int e = rod.first_edge; rod.twist && e < rod.first_edge + rod.edges; ++e) {
       turned_wrong += std::pow(error.atEdge(e), 2);
       turned += std::pow(stages_.back().displacement.edge[e], 2);
+    }
+    for (const JoinedBody &b : potential.elements().bodies({int(r), int(r) + 1})) {
+      const BodyRate off = error.ofBody(b.body), &way = stages_.back().displacement.body[b.body];
+      const MassProperties &all = potential.elements().bodyMass(b.body);
+      const double square = all.inertia.trace() / all.mass;
+      wrong += off.translation.squaredNorm() + square * off.spin.squaredNorm();
+      moved += way.translation.squaredNorm() + square * way.spin.squaredNorm();
     }
     const double length = std::max(potential.length(int(r)), 1e-300);
     auto norm = [&](double positions, double twists) {

@@ -14,6 +14,7 @@ std::vector<std::unique_ptr<Term>> makeRodTerms(const Scene &scene, const Elemen
   if (heavy || !scene.rotation.angular_velocity.isZero(0) || !scene.forces.empty() || !scene.moments.empty())
     terms.push_back(makeLoad(scene, elements));
   if (dynamic) terms.push_back(makeInertia(scene, elements));
+  if (!scene.bodies.empty()) terms.push_back(makeBodyMotion(scene, elements, dynamic));
   return terms;
 }
 
@@ -53,6 +54,7 @@ EnergyBudget &EnergyBudget::operator+=(const EnergyBudget &other) {
   gravity += other.gravity;
   constraint += other.constraint;
   contact += other.contact;
+  body_kinetic += other.body_kinetic;
   return *this;
 }
 

@@ -1,6 +1,7 @@
 #include "tendril/energy/work.hpp"
 
 #include "tendril/energy/derived.hpp"
+#include "tendril/state/spin_stage.hpp"
 
 namespace tendril {
 namespace {
@@ -59,7 +60,21 @@ void addWorkOfLoads(const Scene &scene, const Elements &elements, const Configur
         for (int k = 0; k < 3; ++k)
           sum.add(endEnergy(elements, end, couple, factor_end)[k] -
                   endEnergy(elements, start, couple, factor_start)[k]);
+  for (const Body &body : scene.bodies) {
+    const JoinedBody &b = elements.body(int(&body - scene.bodies.data()));
+    if (body.force.isZero(0) && body.torque.isZero(0)) continue;
+    const Vec3 arm = body.own.centre - elements.bodyMass(b.body).centre,
+               turned = (end.rotationAt(b.rotation) - start.rotationAt(b.rotation)) * arm;
+    sum.add(mean *
+            (body.force.dot(end.displacementAt(b.position, start) + turned) + body.torque.dot(turnOf(b, start, end))));
+  }
   if (factor_end == factor_start) return;
+  for (const Body &body : scene.bodies) {
+    const JoinedBody &b = elements.body(int(&body - scene.bodies.data()));
+    if (!body.gravity) continue;
+    const Vec3 both = start.positionAt(b.position) + end.positionAt(b.position);
+    sum.add(-0.5 * (factor_end - factor_start) * elements.bodyMass(b.body).mass * scene.gravity.dot(both));
+  }
   for (int r = 0; r < int(scene.rods.size()); ++r)
     sum.add(0.5 * (factor_end - factor_start) *
             (weightPotential(scene, elements, start, r) + weightPotential(scene, elements, end, r)));

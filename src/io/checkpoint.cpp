@@ -108,6 +108,13 @@ template <class Archive, class AnyContents> void exchange(Archive &a, AnyContent
   std::size_t groups = s.junction_axes.size();
   whole("junction_groups", groups, 1e15);
   a.array("junction_axes", s.junction_axes, groups);
+  if (a.format_version < 7) return;
+  std::size_t bodies = s.body_rate.size();
+  whole("bodies", bodies, 1e15);
+  a.array("body_position", s.body_position, bodies);
+  a.array("body_position_low", s.body_position_low, bodies);
+  a.array("body_rate", s.body_rate, bodies);
+  for (std::size_t n = 0; n < memory; ++n) a.array("memory_body_" + std::to_string(n), s.memory[n].body, bodies);
 }
 
 /// Whole turns of cells that were others in the checkpoint: the twist of a vertex along the rod stays what it was, by
@@ -326,6 +333,7 @@ void adapt(Found *f, const std::vector<double> &places, const Simulation &run, c
   if (s.contact_stiffness.size() < rods) s.contact_stiffness.clear();
   if (s.contacts.size() != rods) s.contacts.clear();
   s.junction_axes.resize(run.elements->groups, {Vec3::UnitX(), Vec3::UnitY()});
+  for (Rates &rates : s.memory) rates.body.resize(run.scene.bodies.size());
   if (!f->same_method) {
     s.memory.clear();
     s.strains.clear();

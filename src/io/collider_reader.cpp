@@ -8,17 +8,17 @@
 #include <filesystem>
 
 namespace tendril {
-namespace {
 
-constexpr MotionKeys motion_keys{"colliders[].motion", "colliders[].motion.velocity",
-                                 "colliders[].motion.angular_velocity", "colliders[].motion.table"};
-
-/// Turns the axis of a shape, z, to this one.
 Mat3 turnTo(const Vec3 &axis) { return Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), axis).toRotationMatrix(); }
 
 Vec3 axisOf(YamlMap &map, KeyOf<KeyType::vector> key) {
   return map.has(*key) ? unit(map.at(*key)) : map.vector(key).normalized();
 }
+
+namespace {
+
+constexpr MotionKeys motion_keys{"colliders[].motion", "colliders[].motion.velocity",
+                                 "colliders[].motion.angular_velocity", "colliders[].motion.table"};
 
 /// Endless where it is not given.
 double lengthOf(YamlMap &map, KeyOf<KeyType::number> key) { return map.has(*key) ? map.number(key) : HUGE_VAL; }

@@ -1,4 +1,5 @@
 #include "tendril/geometry/rotation.hpp"
+#include "tendril/io/body_reader.hpp"
 #include "tendril/io/support_reader.hpp"
 #include "tendril/io/text.hpp"
 
@@ -128,15 +129,16 @@ void readConstraint(const YamlValue &value, SceneFile &out) {
   Scene &scene = out.scene;
   YamlMap map(value, "constraints");
   const std::string type = map.word("constraints[].type");
+  const std::string name = map.has("constraints[].name") ? readName(map.at("constraints[].name"))
+                                                         : "constraint" + std::to_string(out.constraint_blocks);
+  ++out.constraint_blocks;
+  if (type == "weld" || map.has("constraints[].body")) return readAttachments(map, name, out);
   const YamlValue to = map.at("constraints[].to");
   if (to.isMap())
     refuseForTie(map, type);
   else if (!to.isScalar() || to.text() != "world")
-    to.fail("'to' must be world, or a map of the other vertex, as {rod: b, vertex: 0}");
+    to.fail("'to' must be world, or a map of the other vertex, as {rod: b, vertex: 0}; a body is a 'body'");
   const std::vector<int> rods = readTargets(map, "constraints[].rod", out.names);
-  const std::string name = map.has("constraints[].name") ? readName(map.at("constraints[].name"))
-                                                         : "constraint" + std::to_string(out.constraint_blocks);
-  ++out.constraint_blocks;
   bool told = false;
   const std::size_t before = scene.constraints.size();
   for (const int r : rods) {

@@ -86,6 +86,9 @@ void complete(const YamlValue &value, const Junction &junction, double within, S
     if (!is_new)
       value.fail(labelOf(scene, m) + " is in junction '" + other->second + "' already; " +
                  (other->second == junction.name ? "name it once" : "list all its members in one junction"));
+    if (const auto tied = out.attached.find({m.rod, m.vertex}); tied != out.attached.end())
+      value.fail(labelOf(scene, m) + " is tied to a body by constraint '" + tied->second + "', and junction '" +
+                 junction.name + "' joins it; take it out of one of them, or tie every member to the body instead");
     const Vec3 &first = placeOf(scene, junction.members.front());
     if (const double away = (placeOf(scene, m) - first).norm(); away > within)
       value.fail(labelOf(scene, m) + " is " + shortText(away) + " m from " + labelOf(scene, junction.members.front()) +

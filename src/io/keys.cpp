@@ -45,6 +45,8 @@ const char *typeName(KeyType type) {
     return "one or two numbers";
   case KeyType::vectors:
     return "list of vectors";
+  case KeyType::inertia:
+    return "three or six numbers";
   case KeyType::index:
     return "number from 0, or last";
   case KeyType::rod:
@@ -128,10 +130,23 @@ std::string rulesOf(std::string_view block) {
     return R"("if": {"properties": {"type": {"const": "pin"}}},
  "then": {"not": {"anyOf": [{"required": ["tangent"]}, {"required": ["director"]}]}})";
   if (block == "constraints[]")
-    return R"("if": {"properties": {"type": {"const": "pin"}}},
+    return R"("if": {"anyOf": [{"required": ["body"]}, {"properties": {"type": {"const": "weld"}}}]},
+ "then": {"required": ["body", "vertex"], "properties": {"type": {"enum": ["pin", "weld"]}},
+  "not": {"anyOf": [{"required": ["to"]}, {"required": ["stiffness"]}, {"required": ["motion"]}, {"required": ["point"]}, {"required": ["closest"]},
+   {"required": ["edge"]}, {"required": ["measure"]}, {"required": ["saturation"]}, {"required": ["damping"]}, {"required": ["update_old_target"]}]},
+  "if": {"properties": {"type": {"const": "pin"}}}, "then": {"not": {"anyOf": [{"required": ["tangent"]}, {"required": ["director"]}]}}},
+ "else": {"required": ["stiffness"],
+ "if": {"properties": {"type": {"const": "pin"}}},
  "then": {"oneOf": [{"required": ["vertex"], "properties": {"closest": {"const": false}}}, {"required": ["closest", "point"], "properties": {"closest": {"const": true}}}],
   "not": {"anyOf": [{"required": ["edge"]}, {"required": ["tangent"]}, {"required": ["director"]}, {"required": ["measure"]}]}},
- "else": {"required": ["edge"], "not": {"anyOf": [{"required": ["vertex"]}, {"required": ["closest"]}, {"required": ["point"]}]}})";
+ "else": {"required": ["edge"], "not": {"anyOf": [{"required": ["vertex"]}, {"required": ["closest"]}, {"required": ["point"]}]}}})";
+  if (block == "bodies[]")
+    return R"("oneOf": [
+ {"oneOf": [{"required": ["box"]}, {"required": ["sphere"]}, {"required": ["capsule"]}, {"required": ["cylinder"]}, {"required": ["mesh"]}],
+  "allOf": [{"oneOf": [{"required": ["density"]}, {"required": ["mass"]}]}]},
+ {"required": ["mass", "inertia"], "not": {"anyOf": [{"required": ["density"]}, {"required": ["box"]}, {"required": ["sphere"]}, {"required": ["capsule"]},
+  {"required": ["cylinder"]}, {"required": ["mesh"]}]}}],
+ "dependencies": {"centre": ["inertia"]})";
   if (block == "supports[].motion" || block == "constraints[].motion" || block == "colliders[].motion")
     return R"("oneOf": [{"required": ["table"]}, {"anyOf": [{"required": ["velocity"]}, {"required": ["angular_velocity"]}]}])";
   if (block == "contact")
@@ -177,6 +192,8 @@ std::string valueSchema(const Key &key) {
     const std::string one = "{\"type\": \"number\"" + boundsText(key) + "}";
     return "\"anyOf\": [" + one + ", {\"type\": \"array\", \"items\": " + one + ", \"minItems\": 2, \"maxItems\": 2}]";
   }
+  case KeyType::inertia:
+    return R"("type": "array", "items": {"type": "number"}, "anyOf": [{"minItems": 3, "maxItems": 3}, {"minItems": 6, "maxItems": 6}])";
   case KeyType::index:
     return "\"anyOf\": [{\"type\": \"integer\", \"minimum\": 0}, {\"const\": \"last\"}]";
   case KeyType::rows:

@@ -24,6 +24,7 @@ void requireHeld(const Scene &scene) {
     for (const Junction::Member &m : j.members) first[rootOf(m.rod)] = rootOf(j.members.front().rod);
   for (const Constraint &c : scene.constraints)
     if (c.isTie() && c.stiffness > 0) first[rootOf(c.rod)] = rootOf(c.to_rod);
+  for (const Attachment &a : scene.attachments) first[rootOf(a.rod)] = rootOf(scene.bodies[a.body].rod);
   std::vector<char> held(scene.rods.size(), false);
   for (const Support &s : scene.supports)
     if (s.holdsPosition()) held[rootOf(s.rod)] = true;

@@ -1,5 +1,6 @@
 #include "tendril/io/scene_reader.hpp"
 
+#include "tendril/io/body_reader.hpp"
 #include "tendril/io/collider_reader.hpp"
 #include "tendril/io/junction_reader.hpp"
 #include "tendril/io/polyline_reader.hpp"
@@ -296,6 +297,10 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
     out.notes.push_back(values + " (rod '" + names[0] + "'" +
                         (names.size() > 1 ? " and " + std::to_string(names.size() - 1) + " more" : "") + ")");
   if (out.scene.rods.empty()) map.at("rods").fail("a scene needs at least one rod");
+  if (map.has("bodies"))
+    for (const YamlValue &v : map.at("bodies").items()) readBody(v, out);
+  if (!out.scene.bodies.empty() && !out.scene.rotation.angular_velocity.isZero(0))
+    map.at("rotation").fail("a frame that turns has no forces on 'bodies' yet; take 'rotation' or the bodies away");
   if (map.has("supports"))
     for (const YamlValue &v : map.at("supports").items()) readSupport(v, out);
   if (map.has("constraints"))
@@ -307,6 +312,9 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
   if (map.has("colliders")) {
     for (const YamlValue &v : map.at("colliders").items()) readCollider(v, out.scene);
     if (!out.scene.colliders.empty()) completeContact(map.at("colliders"), overrides, out.scene);
+    if (!out.scene.colliders.empty() && !out.scene.bodies.empty())
+      out.notes.push_back("warning: " + map.at("colliders").place() +
+                          ": rods touch 'colliders', but 'bodies' not yet: they pass through them");
   }
   if (map.has("contact") && out.scene.colliders.empty())
     map.at("contact").fail(
@@ -317,6 +325,7 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
       throw SceneError("option -" + name + ": the scene has no 'colliders' that rods could touch");
   readIgnored(map, out);
   map.finish();
+  out.scene.hostBodies();
   out.source.paths = {path};
   keepFiles(map.at("rods"), out.source);
   return out;

@@ -1,20 +1,26 @@
 #include "tendril/io/trajectory.hpp"
 
 #include "tendril/energy/derived.hpp"
+#include "tendril/io/xdmf.hpp"
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <limits>
-#include <sstream>
 
 namespace tendril {
 namespace {
 
-enum class On { vertices, edges, cells, supports, constraints, colliders };
-constexpr const char *places[] = {"vertices", "edges", "cells", "supports", "constraints", "colliders"};
+enum class On { vertices, edges, cells, supports, constraints, colliders, bodies };
+constexpr const char *places[] = {"vertices", "edges", "cells", "supports", "constraints", "colliders", "bodies"};
+
+/// Bodies by their origins and axes: places, quaternions, velocities, spins, and angular momenta about the centres of
+/// mass.
+struct BodyMotion {
+  std::vector<Vec3> position, velocity, spin, momentum;
+  std::vector<Eigen::Vector4d> rotation;
+};
 
 /// A frame about to be written: a state and what is derived from it, as far as some field needs it.
 struct Snapshot {
@@ -25,8 +31,9 @@ struct Snapshot {
   std::vector<ContactReading> contacts = {};
   std::vector<Vec3> contact_force = {}, collider_force = {}, collider_moment = {}, collider_position = {};
   std::vector<Eigen::Vector4d> collider_rotation = {};
+  BodyMotion body = {};
 };
-enum class From { state, second_word, strains, actions, contact, motion };
+enum class From { state, second_word, strains, actions, contact, motion, bodies };
 
 struct Field {
   const char *name, *unit;
@@ -72,10 +79,18 @@ const Field fields[] = {
      [](const Snapshot &s) { return s.collider_position[0].data(); }},
     {"collider_rotation", "1", On::colliders, 4, From::motion,
      [](const Snapshot &s) { return s.collider_rotation[0].data(); }},
+    // Of the origins of bodies, but the last: it is about the centres of mass.
+    {"body_position", "m", On::bodies, 3, From::bodies, [](const Snapshot &s) { return s.body.position[0].data(); }},
+    {"body_rotation", "1", On::bodies, 4, From::bodies, [](const Snapshot &s) { return s.body.rotation[0].data(); }},
+    {"body_velocity", "m/s", On::bodies, 3, From::bodies, [](const Snapshot &s) { return s.body.velocity[0].data(); }},
+    {"body_angular_velocity", "rad/s", On::bodies, 3, From::bodies,
+     [](const Snapshot &s) { return s.body.spin[0].data(); }},
+    {"body_momentum", "kg m^2/s", On::bodies, 3, From::bodies,
+     [](const Snapshot &s) { return s.body.momentum[0].data(); }},
 };
 
 /// Fields that are written where nothing else is said.
-bool isUsual(From source) { return source == From::state || source == From::motion; }
+bool isUsual(From source) { return source == From::state || source == From::motion || source == From::bodies; }
 
 std::vector<std::string> namesOf(bool derived) {
   std::vector<std::string> names;
@@ -87,13 +102,37 @@ std::vector<std::string> namesOf(bool derived) {
 constexpr auto patience = std::chrono::milliseconds(500); ///< how long rows and frames may wait
 constexpr std::size_t most_waiting = 4 << 20;             ///< [bytes]
 
-std::array<int, 6> sizes(const Scene &scene, const Elements &e) {
+/// w, x, y, z
+Eigen::Vector4d quaternionOf(const Mat3 &rotation) {
+  const Eigen::Quaterniond q(rotation);
+  return {q.w(), q.x(), q.y(), q.z()};
+}
+
+BodyMotion motionOfBodies(const Scene &scene, const Elements &elements, const State &state) {
+  BodyMotion motion;
+  const int count = int(scene.bodies.size());
+  for (int b = 0; b < count; ++b) {
+    const Body &body = scene.bodies[b];
+    const BodyRate &rate = state.body_rate[b];
+    const Mat3 turn = rotationOf(state, elements.groups - count + b);
+    const Vec3 arm = turn * (body.position - elements.bodyMass(b).centre);
+    motion.position.push_back(state.body_position[b] + (arm + state.body_position_low[b]));
+    motion.rotation.push_back(quaternionOf(turn * body.rotation));
+    motion.velocity.push_back(rate.translation + rate.spin.cross(arm));
+    motion.spin.push_back(rate.spin);
+    motion.momentum.push_back(rate.momentum);
+  }
+  return motion;
+}
+
+std::array<int, 7> sizes(const Scene &scene, const Elements &e) {
   return {e.vertices(),
           e.edges(),
           int(e.cell_slot.size()),
           int(e.support_slot.size()),
           int(e.constraint_slot.size()),
-          int(scene.colliders.size())};
+          int(scene.colliders.size()),
+          int(scene.bodies.size())};
 }
 
 } // namespace
@@ -133,7 +172,7 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
     if ((f.source == From::contact && scene.colliders.empty()) || (f.source == From::motion && !scene.collidersMove()))
       continue;
     std::vector<hsize_t> slab{hsize_t(sizes(scene, elements)[std::size_t(f.place)])};
-    if (slab[0] == 0) continue; // cables have no cells, free rods no supports or constraints
+    if (slab[0] == 0) continue; // cables have no cells, free rods no supports, constraints or bodies
     if (f.components > 1) slab.push_back(f.components);
     state_.back() = std::make_unique<Hdf5Series>(file_, std::string("state/") + f.name, slab);
     file_.writeAttribute(std::string("state/") + f.name, "unit", std::string(f.unit));
@@ -203,10 +242,10 @@ void TrajectoryWriter::writeFrame(const State &state) {
   if (contacts_) contacts_->append(snapshot.contacts);
   for (const Collider &c : wanted(From::motion) ? scene_.colliders : std::vector<Collider>()) {
     const Collider::Pose pose = c.poseAt(state.time);
-    const Eigen::Quaterniond q(pose.rotation);
     snapshot.collider_position.push_back(pose.position);
-    snapshot.collider_rotation.emplace_back(q.w(), q.x(), q.y(), q.z());
+    snapshot.collider_rotation.push_back(quaternionOf(pose.rotation));
   }
+  if (wanted(From::bodies)) snapshot.body = motionOfBodies(scene_, elements_, state);
   for (const ConstraintReading &c : snapshot.actions.constraint) {
     for (const Vec3 *x : {&c.distance, &c.rotation})
       snapshot.constraint_deviation.insert(snapshot.constraint_deviation.end(), x->data(), x->data() + 3);
@@ -266,97 +305,37 @@ void TrajectoryWriter::flushWhenDue() {
   described_at_ = now;
 }
 
-/// One frame of a block, in which the mark '@' stands for its number and '#' for its time. `rods`: a polyline each,
-/// with the fields of vertices; `edges`: a segment each, with those of edges as cell data as well.
-std::string TrajectoryWriter::xdmfFrame(bool edges) const {
-  std::ostringstream out;
-  auto dataset = [&](const std::string &name, const std::string &shape, const char *type, int bytes) {
-    out << "<DataItem Dimensions=\"" << shape << "\" NumberType=\"" << type << "\" Precision=\"" << bytes
-        << "\" Format=\"HDF\">trajectory.h5:/" << name << "</DataItem>\n";
+/// `rods`: a polyline each, with the fields of vertices; `edges`: a segment each, with those of edges as cell data as
+/// well; `bodies`: a point each, where they are written.
+void TrajectoryWriter::writeXdmf() const {
+  const std::array<int, 7> rows = sizes(scene_, elements_);
+  auto described = [&](const Field &f, bool of_cells = false) {
+    return XdmfField{f.name, rows[std::size_t(f.place)], int(f.components), of_cells};
   };
-  // One frame out of a dataset (nt, n[, c]), or one of its components. ParaView takes the first text in here as the
-  // geometry's name: it keeps what it read under that name, and complains when there is none.
-  auto frameOf = [&](const Field &f, int component = -1) {
-    const std::string n = std::to_string(f.place == On::vertices ? vertices_ : edges_);
-    std::string shape = n;
-    if (f.components > 1) shape.append(" ").append(std::to_string(f.components));
-    const std::string part = component < 0 ? shape : n + " 1";
-    out << "     <DataItem ItemType=\"HyperSlab\" Dimensions=\"" << (component < 0 ? shape : n)
-        << "\"><!-- frame @ --><DataItem Dimensions=\"3 " << (f.components > 1 ? 3 : 2) << "\" Format=\"XML\">@ 0 ";
-    if (f.components > 1) out << std::max(component, 0) << " 1 ";
-    out << "1 1 1 " << part << "</DataItem>";
-    dataset(std::string("state/") + f.name, std::to_string(times_.size()) + " " + shape, "Float", 8);
-    out << "     </DataItem>\n";
-  };
-  auto attribute = [&](const Field &f, int component = -1) {
-    out << "    <Attribute Name=\"" << f.name;
-    if (component >= 0) out << "_" << component + 1;
-    out << "\" AttributeType=\"" << (f.components == 3 ? "Vector" : "Scalar") << "\" Center=\""
-        << (f.place == On::vertices ? "Node" : "Cell") << "\">\n";
-    frameOf(f, component);
-    out << "    </Attribute>\n";
-  };
-  out << "   <Grid GridType=\"Uniform\">\n    <Time Value=\"#\"/>\n    <Topology TopologyType=";
-  if (edges) {
-    out << "\"Polyline\" NodesPerElement=\"2\" NumberOfElements=\"" << edges_ << "\">";
-    dataset("topology/edges", std::to_string(edges_) + " 2", "Int", 4);
-  } else {
-    out << "\"Mixed\" NumberOfElements=\"" << rods_ << "\">";
-    dataset("topology/polylines", std::to_string(polyline_entries_), "Int", 4);
-  }
-  out << "    </Topology>\n    <Geometry GeometryType=\"XYZ\">\n";
-  frameOf(fields[0]);
-  out << "    </Geometry>\n";
-  out << "    <Attribute Name=\"radius\" AttributeType=\"Scalar\" Center=\"Node\">\n     ";
-  dataset("reference/radius", std::to_string(vertices_), "Float", 8);
-  out << "    </Attribute>\n";
+  auto count = [](auto n) { return "\"" + std::to_string(n) + "\""; };
+  XdmfBlock rods{"rods", "\"Mixed\" NumberOfElements=" + count(rods_), "topology/polylines",
+                 std::to_string(polyline_entries_), "frame"};
+  XdmfBlock edges{"edges", "\"Polyline\" NodesPerElement=\"2\" NumberOfElements=" + count(edges_), "topology/edges",
+                  std::to_string(edges_) + " 2", "frame"};
+  XdmfBlock bodies{"bodies", "\"Polyvertex\" NodesPerElement=\"1\" NumberOfElements=" + count(scene_.bodies.size()),
+                   "topology/bodies", std::to_string(scene_.bodies.size()), "bodies in frame"};
+  rods.position = edges.position = described(fields[0]);
+  rods.has_radius = edges.has_radius = true;
   for (std::size_t k = 1; k < state_.size(); ++k) {
     const Field &f = fields[k];
-    if (!state_[k] || f.place == On::cells || f.place == On::supports || f.place == On::constraints ||
-        f.place == On::colliders || (f.place == On::edges && !edges))
-      continue;
-    if (f.components != 2)
-      attribute(f);
+    if (!state_[k]) continue;
+    if (f.place == On::vertices)
+      for (XdmfBlock *block : {&rods, &edges}) block->fields.push_back(described(f));
+    if (f.place == On::edges) edges.fields.push_back(described(f, true));
+    if (f.place != On::bodies) continue;
+    if (std::string(f.name) == "body_position")
+      bodies.position = described(f);
     else
-      for (const int component : {0, 1}) attribute(f, component); // ParaView knows scalars and vectors of three
+      bodies.fields.push_back(described(f));
   }
-  out << "   </Grid>\n";
-  return out.str();
-}
-
-/// The frames as slabs of the HDF5 datasets, in the form of ParaView's "XDMF Reader".
-void TrajectoryWriter::writeXdmf() const {
-  const std::string path = folder_ + "/trajectory.xdmf";
-  std::ofstream out(path + ".part");
-  out << "<?xml version=\"1.0\"?>\n<!-- In ParaView choose \"XDMF Reader\"; its Xdmf3 readers do not know HyperSlab. "
-         "-->\n<Xdmf Version=\"3.0\">\n <Domain>\n";
-  for (const bool edges : {false, true}) {
-    out << "  <Grid Name=\"" << (edges ? "edges" : "rods")
-        << "\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
-    const std::string pattern = xdmfFrame(edges);
-    std::string text;
-    for (std::size_t frame = 0; frame < times_.size(); ++frame) {
-      char time[32];
-      std::snprintf(time, sizeof time, "%.17g", times_[frame]);
-      const std::string number = std::to_string(frame);
-      text.clear();
-      for (std::size_t at = 0; at < pattern.size();) {
-        const std::size_t mark = std::min(pattern.find_first_of("@#", at), pattern.size());
-        text.append(pattern, at, mark - at);
-        if (mark < pattern.size()) text += pattern[mark] == '@' ? number.c_str() : time;
-        at = mark + 1;
-      }
-      out << text;
-    }
-    out << "  </Grid>\n";
-  }
-  out << " </Domain>\n</Xdmf>\n";
-  out.close();
-  std::error_code error;
-  if (out) std::filesystem::rename(path + ".part", path, error);
-  if (out && !error) return;
-  std::filesystem::remove(path + ".part", error);
-  throw WriteError(path + ": cannot be written; is the disk full?");
+  std::vector<XdmfBlock> blocks{rods, edges};
+  if (!bodies.position.name.empty()) blocks.push_back(bodies);
+  tendril::writeXdmf(folder_ + "/trajectory.xdmf", blocks, times_);
 }
 
 } // namespace tendril

@@ -65,6 +65,7 @@ void TrajectoryWriter::writeHeader(const Scene &scene, const Elements &elements,
   writeSupports();
   writeConstraints();
   writeColliders();
+  writeBodies();
   writeMaterials();
 }
 
@@ -139,13 +140,20 @@ void TrajectoryWriter::writeConstraints() {
   file_.write("constraints/to_vertex", {others.size()}, others.data());
 }
 
-/// Radii, then half lengths.
-static std::vector<double> parametersOf(const Collider &c) {
-  if (c.kind == "sphere") return {c.size[0]};
-  if (c.kind == "capsule" || c.kind == "cylinder") return {c.size[0], 0.5 * c.size[1]};
-  if (c.kind == "box") return {0.5 * c.size[0], 0.5 * c.size[1], 0.5 * c.size[2]};
-  if (c.kind == "tube") return {c.size[0], c.size[1], 0.5 * c.size[2]};
-  return {}; // of a plane: z is its normal
+/// Of a shape, padded with nan: radii, then half lengths.
+static std::array<double, 3> parametersOf(const std::string &shape, const Vec3 &size) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  if (shape == "sphere") return {size[0], nan, nan};
+  if (shape == "capsule" || shape == "cylinder") return {size[0], 0.5 * size[1], nan};
+  if (shape == "box") return {0.5 * size[0], 0.5 * size[1], 0.5 * size[2]};
+  if (shape == "tube") return {size[0], size[1], 0.5 * size[2]};
+  return {nan, nan, nan}; // of a plane: z is its normal
+}
+
+static void writeMesh(Hdf5File &file, const std::string &group, const TriangleMesh &mesh) {
+  file.createGroup(group);
+  file.write(group + "/vertices", {mesh.vertices.size(), 3}, mesh.vertices[0].data(), "m");
+  file.write(group + "/triangles", {mesh.triangles.size(), 3}, mesh.triangles[0].data());
 }
 
 void TrajectoryWriter::writeColliders() {
@@ -157,26 +165,63 @@ void TrajectoryWriter::writeColliders() {
     const Eigen::Quaterniond q(c.rotation);
     names.push_back(c.name);
     shapes.push_back(c.kind);
-    const std::vector<double> p = parametersOf(c);
-    for (std::size_t k = 0; k < 3; ++k) parameters.push_back(k < p.size() ? p[k] : std::nan(""));
+    const std::array<double, 3> p = parametersOf(c.kind, c.size);
+    parameters.insert(parameters.end(), p.begin(), p.end());
     positions.insert(positions.end(), c.position.data(), c.position.data() + 3);
     rotations.insert(rotations.end(), {q.w(), q.x(), q.y(), q.z()});
   }
   file_.createGroup("colliders");
   file_.createGroup("colliders/meshes");
-  for (std::size_t k = 0; k < n; ++k) {
-    if (!scene_.colliders[k].mesh) continue;
-    const TriangleMesh &mesh = *scene_.colliders[k].mesh;
-    const std::string group = "colliders/meshes/" + std::to_string(k);
-    file_.createGroup(group);
-    file_.write(group + "/vertices", {mesh.vertices.size(), 3}, mesh.vertices[0].data(), "m");
-    file_.write(group + "/triangles", {mesh.triangles.size(), 3}, mesh.triangles[0].data());
-  }
+  for (std::size_t k = 0; k < n; ++k)
+    if (scene_.colliders[k].mesh) writeMesh(file_, "colliders/meshes/" + std::to_string(k), *scene_.colliders[k].mesh);
   file_.write("colliders/name", names);
   file_.write("colliders/shape", shapes);
   file_.write("colliders/parameters", {n, 3}, parameters.data(), "m");
   file_.write("colliders/position", {n, 3}, positions.data(), "m");
   file_.write("colliders/rotation", {n, 4}, rotations.data(), "1");
+}
+
+void TrajectoryWriter::writeBodies() {
+  if (scene_.bodies.empty()) return;
+  const std::size_t n = scene_.bodies.size();
+  std::vector<std::string> names, shapes;
+  std::vector<double> parameters, mass, inertia, centre;
+  std::vector<int> points;
+  file_.createGroup("bodies");
+  file_.createGroup("bodies/meshes");
+  for (std::size_t b = 0; b < n; ++b) {
+    const Body &body = scene_.bodies[b];
+    const MassProperties &all = elements_.bodyMass(int(b));
+    const std::array<double, 3> p = parametersOf(body.shape, body.size);
+    points.push_back(int(b));
+    names.push_back(body.name);
+    shapes.push_back(body.shape);
+    parameters.insert(parameters.end(), p.begin(), p.end());
+    mass.push_back(all.mass);
+    inertia.insert(inertia.end(), all.inertia.data(), all.inertia.data() + 9); // symmetric
+    centre.insert(centre.end(), all.centre.data(), all.centre.data() + 3);
+    if (body.mesh) writeMesh(file_, "bodies/meshes/" + std::to_string(b), *body.mesh);
+  }
+  file_.write("topology/bodies", {n}, points.data()); // cells of XDMF
+  file_.write("bodies/name", names);
+  file_.write("bodies/shape", shapes);
+  file_.write("bodies/parameters", {n, 3}, parameters.data(), "m");
+  file_.write("bodies/mass", {n}, mass.data(), "kg");
+  file_.write("bodies/inertia", {n, 3, 3}, inertia.data(), "kg m^2");
+  file_.write("bodies/centre", {n, 3}, centre.data(), "m");
+  if (scene_.attachments.empty()) return;
+  std::vector<std::string> attachments, types;
+  std::vector<int> bodies, vertices;
+  for (const Attachment &a : scene_.attachments) {
+    attachments.push_back(a.name);
+    types.push_back(a.weld ? "weld" : "pin");
+    bodies.push_back(a.body);
+    vertices.push_back(elements_.rods[a.rod].first_vertex + a.vertex);
+  }
+  file_.write("bodies/attachment_name", attachments);
+  file_.write("bodies/attachment_body", {bodies.size()}, bodies.data());
+  file_.write("bodies/attachment_vertex", {vertices.size()}, vertices.data());
+  file_.write("bodies/attachment_type", types);
 }
 
 void TrajectoryWriter::writeMaterials() {

@@ -48,6 +48,7 @@ PetscErrorCode DofMap::createSection(PetscSection *section) const {
   PetscInt points = 0;
   for (const RodRange &r : rods_) points += r.vertices + r.edges;
   for (const JoinedEdge &j : joined_edges_.items) points += j.isFirst();
+  points += 2 * PetscInt(bodies_.items.size());
   PetscCall(PetscSectionCreate(PETSC_COMM_SELF, section));
   PetscCall(PetscSectionSetNumFields(*section, groups_ == 0 ? 2 : 3));
   PetscCall(PetscSectionSetFieldName(*section, 0, "position"));
@@ -81,6 +82,11 @@ PetscErrorCode DofMap::createSection(PetscSection *section) const {
       PetscCall(PetscSectionSetDof(*section, point, 3));
       PetscCall(PetscSectionSetFieldDof(*section, point++, 2, 3));
     }
+    for (std::size_t b = 0; b < bodies({r, r + 1}).size(); ++b)
+      for (const PetscInt field : {0, 2}) {
+        PetscCall(PetscSectionSetDof(*section, point, 3));
+        PetscCall(PetscSectionSetFieldDof(*section, point++, field, 3));
+      }
   }
   PetscCall(PetscSectionSetUp(*section));
   const PetscInt all[3] = {0, 1, 2};
@@ -104,7 +110,7 @@ void DofMap::layOut(const Scene &scene) {
   for (const Constraint &c : scene.constraints)
     if (!c.isTie()) along[c.rod] += c.slots();
   const std::vector<int> before_joins = along;
-  bool joins = !scene.junctions.empty();
+  bool joins = !scene.junctions.empty() || !scene.bodies.empty();
   for (const Constraint &c : scene.constraints)
     if (c.isTie()) {
       ++along[c.rod];
@@ -112,6 +118,8 @@ void DofMap::layOut(const Scene &scene) {
     }
   for (const Junction &j : scene.junctions)
     for (const Junction::Member &m : j.members) along[m.rod] += 4; // frames and half cells of two edges
+  for (const Body &b : scene.bodies) along[b.rod] += 2;
+  for (const Attachment &a : scene.attachments) along[a.rod] += 5; // and a frame of the vertex
   slots_ = lanes;                                                  // room for the frame before the first rod
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
     const Rod &rod = scene.rods[r];
@@ -171,6 +179,12 @@ PetscErrorCode DofMap::setUp(const Scene &scene) {
       PetscCall(PetscSectionGetOffset(global, point++, &offset));
       for (int a = 0; a < 3; ++a) unknown_[std::size_t(slot_size) * j.frame + a] = offset + a;
     }
+    for (const JoinedBody &b : bodies({r, r + 1}))
+      for (const int slot : {b.position, b.rotation}) {
+        PetscInt offset;
+        PetscCall(PetscSectionGetOffset(global, point++, &offset));
+        for (int a = 0; a < 3; ++a) unknown_[std::size_t(slot_size) * slot + a] = offset + a;
+      }
     for (PetscInt *u = &unknown_[std::size_t(slot_size) * rod.first_slot];
          u < &unknown_[std::size_t(slot_size) * unknown_end_[r]]; ++u)
       if (*u >= 0) PetscCheck(*u == next++, PETSC_COMM_SELF, PETSC_ERR_PLIB, "unknowns must follow the slots");
@@ -185,12 +199,54 @@ void DofMap::makeIsland(RodSet a, RodSet b) {
   for (int r = island.begin; r < island.end; ++r) islands_[r] = island;
 }
 
+/// Ties the edges beside a vertex to the frame of a group, each by a frame and a half cell of its own. \param joined of
+/// the first frame, or with that below 0: it is that of the first edge then
+void DofMap::tieEdges(const Scene &scene, JoinedEdge joined, std::vector<int> &free_slots) {
+  const RodRange &range = rods_[joined.rod];
+  const Rod &rod = scene.rods[joined.rod];
+  for (const bool ends : {true, false}) {
+    joined.edge = ends ? rod.edgeBefore(joined.vertex) : rod.edgeAfter(joined.vertex);
+    if (joined.edge < 0) continue;
+    joined.frame = range.looseSlot() + free_slots[joined.rod]++;
+    joined.cell = range.looseSlot() + free_slots[joined.rod]++;
+    joined.ends = ends;
+    if (joined.first_frame < 0) {
+      joined.first_frame = joined.frame;
+      unknown_end_[joined.rod] = std::max(unknown_end_[joined.rod], joined.frame + 1);
+    }
+    joined_edges_.items.push_back(joined);
+  }
+}
+
+void DofMap::joinBodies(const Scene &scene, std::vector<int> &free_slots) {
+  for (const Body &body : scene.bodies) {
+    const RodRange &range = rods_[body.rod];
+    const int position = range.looseSlot() + free_slots[body.rod]++,
+              rotation = range.looseSlot() + free_slots[body.rod]++;
+    bodies_.items.push_back({body.rod, position, rotation, int(bodies_.items.size()), groups_++});
+    unknown_end_[body.rod] = std::max(unknown_end_[body.rod], rotation + 1);
+    joined_[body.rod] = true;
+  }
+  for (int k = 0; k < int(scene.attachments.size()); ++k) {
+    const Attachment &a = scene.attachments[k];
+    const RodRange &range = rods_[a.rod];
+    const JoinedBody &body = bodies_.items[a.body];
+    joined_vertices_.items.push_back({a.rod, a.vertex, range.slot(a.vertex), body.position, -1, k,
+                                      range.looseSlot() + free_slots[a.rod]++, body.rotation});
+    makeIsland(islands_[body.rod], islands_[a.rod]);
+    joined_[a.rod] = true;
+    if (a.weld && range.twist)
+      tieEdges(scene, {a.rod, -1, a.vertex, -1, -1, body.rotation, body.group, true, false}, free_slots);
+  }
+}
+
 /// What junctions and ties make of vertices and edges, and the islands. A vertex that a support holds holds the others
 /// of its junction with it.
 void DofMap::join(const Scene &scene, std::vector<int> free_slots) {
   joined_vertices_ = {};
   joined_edges_ = {};
   ties_ = {};
+  bodies_ = {};
   groups_ = 0;
   islands_.clear();
   joined_.assign(rods_.size(), false);
@@ -204,27 +260,18 @@ void DofMap::join(const Scene &scene, std::vector<int> free_slots) {
     std::vector<int> first_frame(junction.groups, -1);
     for (const Junction::Member &m : junction.members) {
       const RodRange &range = rods_[m.rod];
-      const Rod &rod = scene.rods[m.rod];
       joined_vertices_.items.push_back({m.rod, m.vertex, range.slot(m.vertex), rods_[first.rod].slot(first.vertex), k});
       makeIsland(islands_[first.rod], islands_[m.rod]);
       joined_[m.rod] = true;
       if (m.group < 0 || !range.twist) continue;
-      for (const bool ends : {true, false}) {
-        const int edge = ends ? rod.edgeBefore(m.vertex) : rod.edgeAfter(m.vertex);
-        if (edge < 0) continue;
-        const int frame = range.looseSlot() + free_slots[m.rod]++, cell = range.looseSlot() + free_slots[m.rod]++;
-        int &of_group = first_frame[m.group];
-        if (of_group < 0) {
-          of_group = frame;
-          unknown_end_[m.rod] = std::max(unknown_end_[m.rod], frame + 1);
-        }
-        joined_edges_.items.push_back({m.rod, edge, m.vertex, cell, frame, of_group, groups_ + m.group, ends});
-      }
+      tieEdges(scene, {m.rod, -1, m.vertex, -1, -1, first_frame[m.group], groups_ + m.group, false, false}, free_slots);
+      first_frame[m.group] = joined_edges_.items.back().first_frame;
     }
     for (const Junction::Member &m : junction.members)
       if (held) held_[rods_[m.rod].first_vertex + m.vertex] = true;
     groups_ += junction.groups;
   }
+  joinBodies(scene, free_slots);
   for (int k = 0; k < int(scene.constraints.size()); ++k) {
     const Constraint &c = scene.constraints[k];
     if (!c.isTie()) continue;
@@ -235,8 +282,11 @@ void DofMap::join(const Scene &scene, std::vector<int> free_slots) {
     joined_[c.rod] = joined_[c.to_rod] = true;
   }
   joined_vertices_.sort(rods_.size());
+  for (std::size_t k = 0; k < joined_vertices_.items.size(); ++k) joined_vertices_.items[k].number = int(k);
   joined_edges_.sort(rods_.size());
   ties_.sort(rods_.size());
+  bodies_.sort(rods_.size());
+  arms_.assign(joined_vertices_.items.size(), Vec3::Zero());
 }
 
 void DofMap::copyBehindRing(const RodRange &rod, Planes &increment) const {
@@ -257,7 +307,13 @@ void DofMap::fold(const RodRange &rod, Planes &sums) const {
 
 void DofMap::copyJoined(RodSet islands, Planes &increment) const {
   for (const JoinedVertex &j : joinedVertices(islands)) {
-    if (j.isCopy()) increment.setVector(0, j.slot, increment.vector(0, j.first_slot));
+    Vec3 moved = increment.vector(0, j.first_slot);
+    if (j.isOnBody()) {
+      const Vec3 spin = increment.vector(0, j.first_frame);
+      increment.setVector(0, j.frame, spin);
+      moved += spin.cross(arm(j));
+    }
+    if (j.isCopy()) increment.setVector(0, j.slot, moved);
     copyBehindRing(rods_[j.rod], increment);
   }
   for (const JoinedEdge &j : joinedEdges(islands))
@@ -271,8 +327,13 @@ void DofMap::foldJoined(RodSet islands, Planes &sums) const {
     sums.setVector(0, from, Vec3::Zero());
   };
   for (const Tie &t : ties(islands)) move(t.copy, t.of);
-  for (const JoinedVertex &j : joinedVertices(islands))
+  for (const JoinedVertex &j : joinedVertices(islands)) {
+    if (j.isOnBody()) {
+      sums.setVector(0, j.frame, arm(j).cross(sums.vector(0, j.slot)));
+      move(j.frame, j.first_frame);
+    }
     if (j.isCopy()) move(j.slot, j.first_slot);
+  }
   for (const JoinedEdge &j : joinedEdges(islands))
     if (!j.isFirst()) move(j.frame, j.first_frame);
 }
@@ -282,6 +343,8 @@ double DofMap::dot(RodSet island, const Planes &a, const Planes &b) const {
   for (int r = island.begin; r < island.end; ++r) sum += tendril::dot(rods_[r], a, b);
   for (const JoinedEdge &j : joinedEdges(island))
     if (j.isFirst()) sum += a.vector(0, j.frame).dot(b.vector(0, j.frame));
+  for (const JoinedBody &j : bodies(island))
+    for (const int s : {j.position, j.rotation}) sum += a.vector(0, s).dot(b.vector(0, s));
   return sum;
 }
 

@@ -4,10 +4,12 @@
 namespace tendril {
 namespace {
 
-/// An unknown that an edge variable is made of, or the position of a vertex: e_i = x_{i+1} - x_i.
+/// An unknown that an edge variable is made of, or the position of a vertex: e_i = x_{i+1} - x_i; with the component of
+/// an arm that it is multiplied by, three times the number of the arm and the axis, or -1.
 struct Part {
   PetscInt unknown;
   bool minus;
+  int factor = -1;
 };
 
 } // namespace
@@ -24,6 +26,7 @@ PetscErrorCode DofMap::createMatrix(RodSet rods, bool joins, Mat *matrix, Patter
   std::vector<PetscInt> row, column;
   std::vector<std::ptrdiff_t> &source_of = pattern->source;
   source_of.clear();
+  pattern->factor.clear();
   EdgeBlocks blocks(0, joins); // for its window
   blocks.setOrigin(rods_[rods.begin].first_slot);
   const PetscInt first = firstUnknown(rods);
@@ -32,6 +35,18 @@ PetscErrorCode DofMap::createMatrix(RodSet rods, bool joins, Mat *matrix, Patter
     const auto found = copies.find(slot);
     return unknown(found == copies.end() ? slot : found->second, a);
   };
+  std::unordered_map<int, const JoinedVertex *> on_body;
+  for (const JoinedVertex &j : joinedVertices(rods))
+    if (j.isOnBody()) on_body[j.slot] = &j;
+  /// Adds the coordinate of a vertex: that of a point of a body moves by the spin x arm, too.
+  auto addPosition = [&](std::vector<Part> &parts, int slot, int a, bool minus) {
+    parts.push_back({shared(slot, a), minus});
+    const auto found = on_body.find(slot);
+    if (found == on_body.end()) return;
+    const int b = (a + 1) % 3, c = (a + 2) % 3, arm = 3 * found->second->number;
+    parts.push_back({unknown(found->second->first_frame, b), minus, arm + c});
+    parts.push_back({unknown(found->second->first_frame, c), !minus, arm + b});
+  };
   for (int r = rods.begin; r < rods.end; ++r) {
     const RodRange &rod = rods_[r];
     auto slot = [&](int i) { return rod.slot(rod.closed ? i % rod.vertices : i); };
@@ -39,11 +54,17 @@ PetscErrorCode DofMap::createMatrix(RodSet rods, bool joins, Mat *matrix, Patter
       std::vector<Part> parts;
       if (r == 3)
         parts = {{unknown(slot(i), 3), false}};
-      else
-        parts = {{shared(slot(i), r), true}, {shared(slot(i + 1), r), false}};
+      else {
+        addPosition(parts, slot(i), r, true);
+        addPosition(parts, slot(i + 1), r, false);
+      }
       return parts;
     };
-    auto position = [&](int i, int r) { return std::vector<Part>{{shared(slot(i), r), false}}; };
+    auto position = [&](int i, int r) {
+      std::vector<Part> parts;
+      addPosition(parts, slot(i), r, false);
+      return parts;
+    };
     auto couple = [&](const std::vector<Part> &left, const std::vector<Part> &right, int plane, int i, bool once) {
       const std::ptrdiff_t source = std::ptrdiff_t(blocks.offset(rod, plane)) + i;
       for (const Part &a : left)
@@ -54,6 +75,7 @@ PetscErrorCode DofMap::createMatrix(RodSet rods, bool joins, Mat *matrix, Patter
             row.push_back((mirrored ? b.unknown : a.unknown) - first);
             column.push_back((mirrored ? a.unknown : b.unknown) - first);
             source_of.push_back(a.minus == b.minus ? source : ~source);
+            if (!on_body.empty()) pattern->factor.push_back({a.factor, b.factor});
           }
         }
     };
@@ -78,8 +100,19 @@ PetscErrorCode DofMap::createMatrix(RodSet rods, bool joins, Mat *matrix, Patter
           couple(spin(a), edge(j.edge, c), EdgeBlocks::across(a, c), j.cell - rod.first_slot, false);
       }
     }
+    for (const JoinedBody &b : bodies({r, r + 1}))
+      for (const int s : {b.position, b.rotation})
+        for (int a = 0; a < 3; ++a)
+          for (int c = a; c < 3; ++c)
+            couple({{unknown(s, a), false}}, {{unknown(s, c), false}}, EdgeBlocks::vertex(a, c), s - rod.first_slot,
+                   a == c);
     for (const Tie &t : ties({r, r + 1})) {
-      auto difference = [&](int a) { return std::vector<Part>{{shared(t.slot, a), false}, {shared(t.of, a), true}}; };
+      auto difference = [&](int a) {
+        std::vector<Part> parts;
+        addPosition(parts, t.slot, a, false);
+        addPosition(parts, t.of, a, true);
+        return parts;
+      };
       for (int a = 0; a < 3; ++a)
         for (int c = a; c < 3; ++c)
           couple(difference(a), difference(c), EdgeBlocks::vertex(a, c), t.copy - rod.first_slot, a == c);
@@ -96,12 +129,15 @@ PetscErrorCode DofMap::createMatrix(RodSet rods, bool joins, Mat *matrix, Patter
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode DofMap::fillMatrix(const EdgeBlocks &blocks, Pattern &pattern, Mat matrix) {
+PetscErrorCode DofMap::fillMatrix(const EdgeBlocks &blocks, Pattern &pattern, Mat matrix) const {
   PetscFunctionBeginUser;
   for (std::size_t n = 0; n < pattern.source.size(); ++n) {
     const std::ptrdiff_t from = pattern.source[n];
     pattern.entries[n] = from >= 0 ? blocks.data()[from] : -blocks.data()[~from];
   }
+  for (std::size_t n = 0; n < pattern.factor.size(); ++n)
+    for (const int f : pattern.factor[n])
+      if (f >= 0) pattern.entries[n] *= arms_[std::size_t(f / 3)][f % 3];
   PetscCall(MatSetValuesCOO(matrix, pattern.entries.data(), INSERT_VALUES));
   PetscFunctionReturn(0);
 }

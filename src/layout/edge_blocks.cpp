@@ -76,6 +76,11 @@ void EdgeBlocks::multiply(const RodRange &rod, const Joins &of, const Planes &x,
     }
     add(j.edge, force);
   }
+  for (const JoinedBody &b : of.bodies)
+    for (const int s : {b.position, b.rotation})
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c)
+          y[r][s] += value(vertex(std::min(r, c), std::max(r, c)), s - rod.first_slot) * x[c][s];
   for (const Tie &t : of.ties) {
     const Vec3 moved = x.vector(0, t.slot) - x.vector(0, t.copy);
     for (int r = 0; r < 3; ++r)
@@ -115,6 +120,11 @@ double EdgeBlocks::magnitude(const RodRange &rod, const Joins &of, const Planes 
         sum += std::pow(2 * entry(rod, across(r, c))[j.cell - rod.first_slot] * x[r][j.frame] * d, 2);
       }
     }
+  for (const JoinedBody &b : of.bodies)
+    for (const int s : {b.position, b.rotation})
+      for (int r = 0; r < 3; ++r)
+        for (int c = r; c < 3; ++c)
+          sum += std::pow((r == c ? 1 : 2) * entry(rod, vertex(r, c))[s - rod.first_slot] * x[r][s] * x[c][s], 2);
   for (const Tie &t : of.ties) {
     const Vec3 moved = x.vector(0, t.slot) - x.vector(0, t.copy);
     for (int r = 0; r < 3; ++r)

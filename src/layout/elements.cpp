@@ -20,8 +20,8 @@ std::array<double, 3> integratedStrain(const Vec3 &strain, double length, Measur
 class CellBuilder {
 public:
   CellBuilder(const Scene &scene, int rod, Elements &out)
-      : rod_(scene.rods[rod]), range_(out.rods[rod]), loose_(out.loose[rod]), next_(range_.looseSlot()), out_(out),
-        joined_(out.joinedEdges({rod, rod + 1})), holder_(rod_.vertices(), nullptr) {
+      : scene_(scene), rod_(scene.rods[rod]), range_(out.rods[rod]), loose_(out.loose[rod]), next_(range_.looseSlot()),
+        out_(out), joined_(out.joinedEdges({rod, rod + 1})), holder_(rod_.vertices(), nullptr) {
     for (const int s : out.supportsOf(rod)) {
       const Support &support = scene.supports[s];
       if (!support.holdsTwist()) continue;
@@ -82,6 +82,7 @@ public:
   }
 
 private:
+  const Scene &scene_;
   const Rod &rod_;
   const RodRange &range_;
   std::vector<LooseCell> &loose_;
@@ -126,7 +127,10 @@ private:
   /// natural strains turns at its vertices along the rod, too.
   void addJoinedCell(const JoinedEdge &j) {
     const Frame f = referenceFrame(rod_, j.edge);
-    const Frame at = rod_.natural == Rod::Natural::as_drawn || isEnd(j.vertex) ? f : frameAtVertex(rod_, j.vertex);
+    Frame at = rod_.natural == Rod::Natural::as_drawn || isEnd(j.vertex) ? f : frameAtVertex(rod_, j.vertex);
+    if (j.of_body && isEnd(j.vertex))
+      for (const JoinedVertex &v : out_.joinedVertices({j.rod, j.rod + 1}))
+        if (v.vertex == j.vertex) at = scene_.attachments[v.attachment].frame;
     const Frame drawn{at.tangent, orthonormalised(at.director, at.tangent), 1};
     out_.joined_frame_[&j - out_.joined_edges_.items.data()] = drawn;
     const int edge = range_.slot(j.edge), middle = place(j.vertex);
@@ -172,7 +176,8 @@ Elements::Elements(const Scene &scene, const DofMap &dofs)
     : rods(dofs.rods()), slots(dofs.slots()), loose(rods.size()), end_couples(rods.size()),
       support_slot(scene.supports.size(), -1), rod_cells{0}, groups(dofs.groups()),
       supports_(scene.supports, rods.size()), forces_(scene.forces, rods.size()), moments_(scene.moments, rods.size()),
-      joined_edges_(dofs.joinedEdges()), joined_vertices_(dofs.joinedVertices()), ties_(dofs.ties()) {
+      joined_edges_(dofs.joinedEdges()), joined_vertices_(dofs.joinedVertices()), ties_(dofs.ties()),
+      bodies_(dofs.bodies()) {
   std::vector<int> free_slots; ///< per rod, behind those of its supports
   constants_ = Planes(7, slots);
   joined_frame_.resize(joined_edges_.items.size());
@@ -215,6 +220,27 @@ Elements::Elements(const Scene &scene, const DofMap &dofs)
     rod_cells.push_back(int(cell_slot.size()));
   }
   if (!scene.constraints.empty()) placeConstraints(scene, std::move(free_slots));
+  weighBodies(scene);
+}
+
+/// The mass of a vertex that is a point of a body is a part of the body.
+void Elements::weighBodies(const Scene &scene) {
+  place_of_body_.resize(scene.bodies.size());
+  for (std::size_t k = 0; k < bodies_.items.size(); ++k) place_of_body_[bodies_.items[k].body] = int(k);
+  for (const Body &body : scene.bodies) body_mass_.push_back(body.own);
+  body_of_.assign(joined_vertices_.items.size(), -1);
+  arm_.assign(joined_vertices_.items.size(), Vec3::Zero());
+  auto each = [&](auto visit) {
+    for (std::size_t k = 0; k < joined_vertices_.items.size(); ++k)
+      if (const JoinedVertex &j = joined_vertices_.items[k]; j.isOnBody())
+        visit(k, scene.attachments[j.attachment].body, scene.rods[j.rod].position[j.vertex], constants_[0][j.slot]);
+  };
+  each([&](std::size_t k, int body, const Vec3 &x, double &mass) {
+    body_of_[k] = body;
+    body_mass_[body].add({mass, x, Mat3::Zero()});
+    mass = 0;
+  });
+  each([&](std::size_t k, int body, const Vec3 &x, double &) { arm_[k] = x - body_mass_[body].centre; });
 }
 
 /// Slots behind those of supports along a rod.

@@ -104,7 +104,9 @@ Frame frameBetween(const Rod &rod, int vertex) {
 /// Whether the end of an open rod at a vertex is free to turn, tangent and director.
 bool isFreeEnd(const Scene &scene, int rod, int vertex) {
   return std::none_of(scene.supports.begin(), scene.supports.end(),
-                      [&](const Support &s) { return s.rod == rod && s.vertex == vertex && s.holdsTwist(); });
+                      [&](const Support &s) { return s.rod == rod && s.vertex == vertex && s.holdsTwist(); }) &&
+         std::none_of(scene.attachments.begin(), scene.attachments.end(),
+                      [&](const Attachment &a) { return a.rod == rod && a.vertex == vertex && a.weld; });
 }
 
 void addCouple(const Scene &written, const Drawing &drawing, const EdgeMoment &couple, int edges,
@@ -160,6 +162,7 @@ std::vector<int> namedVertices(const Scene &scene, int r) {
     if (c.isTie()) add(c.to_rod, c.to_vertex);
   for (const Junction &j : scene.junctions)
     for (const Junction::Member &m : j.members) add(m.rod, m.vertex);
+  for (const Attachment &a : scene.attachments) add(a.rod, a.vertex);
   for (const NodalForce &f : scene.forces) add(f.rod, f.vertex);
   return named;
 }
@@ -316,6 +319,19 @@ Scene remesh(const Scene &written, const std::vector<Drawing> &drawings, const s
           c.tangent_given ? transport<double>(drawn.director, drawn.tangent, c.frame.tangent) : drawn.director;
     if (!c.tangent_given) c.frame.tangent = drawn.tangent;
     c.frame.director = orthonormalised(c.frame.director, c.frame.tangent);
+  }
+  scene.bodies = written.bodies;
+  for (const Attachment &attachment : written.attachments) {
+    Attachment &a = scene.attachments.emplace_back(attachment);
+    const Drawing &drawing = drawings[a.rod];
+    if (!isRemeshed(written.rods[a.rod], drawing, edges[a.rod])) continue;
+    a.vertex = movedVertex(written.rods[a.rod], drawing, a.vertex, edges[a.rod]);
+    const Rod &rod = scene.rods[a.rod];
+    const Frame f = drawing.grading ? frameBetween(rod, a.vertex) : frameAtVertex(rod, a.vertex);
+    const Vec3 tangent = a.tangent_given ? a.frame.tangent : f.tangent;
+    if (!a.director_given) a.frame.director = transport<double>(f.director, f.tangent, tangent);
+    a.frame.tangent = tangent;
+    a.frame.director = orthonormalised(a.frame.director, tangent);
   }
   for (const Junction &junction : written.junctions) {
     Junction &j = scene.junctions.emplace_back(junction);

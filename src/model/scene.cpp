@@ -78,6 +78,16 @@ Scene withRods(const Scene &scene, const std::vector<int> &rods) {
     Junction &kept = out.junctions.emplace_back(j);
     for (Junction::Member &m : kept.members) m.rod = place[m.rod];
   }
+  std::vector<int> body(scene.bodies.size(), -1);
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    if (place[scene.bodies[b].rod] < 0) continue;
+    body[b] = int(out.bodies.size());
+    out.bodies.push_back(scene.bodies[b]);
+    out.bodies.back().rod = place[scene.bodies[b].rod];
+  }
+  keep(scene.attachments, place, out.attachments);
+  for (Attachment &a : out.attachments) a.body = body[a.body];
+  out.hostBodies();
   keep(scene.forces, place, out.forces);
   keep(scene.moments, place, out.moments);
   return out;
@@ -208,8 +218,19 @@ DimensionlessGroups dimensionlessGroups(const Rod &rod, const Vec3 &gravity, con
   return g;
 }
 
+void Scene::hostBodies() {
+  for (const Attachment &a : attachments) bodies[a.body].rod = a.rod;
+  for (const Attachment &a : attachments) bodies[a.body].rod = std::min(bodies[a.body].rod, a.rod);
+}
+
+bool Scene::hasCouples() const {
+  if (whole) return whole->has_couples;
+  return !moments.empty() ||
+         std::any_of(bodies.begin(), bodies.end(), [](const Body &b) { return !b.torque.isZero(0); });
+}
+
 bool Scene::isJoined() const {
-  return !junctions.empty() ||
+  return !junctions.empty() || !bodies.empty() ||
          std::any_of(constraints.begin(), constraints.end(), [](const Constraint &c) { return c.isTie(); });
 }
 

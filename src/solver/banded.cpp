@@ -16,8 +16,8 @@ template <class T> const T *as(const double *p) { return reinterpret_cast<const 
 
 } // namespace
 
-void addMetric(const Planes &metric, const double *edges, const RodRange &rod, std::span<const JoinedEdge> joined,
-               double scale, const Planes &v, Planes &y) {
+void addMetric(const Planes &metric, const double *edges, const RodRange &rod, const Joins &joins, double scale,
+               const Planes &v, Planes &y) {
   for (int a = 0; a < slot_size; ++a)
     for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) y[a][s] += scale * metric[a][s] * v[a][s];
   for (int a = 0; edges && a < 3; ++a)
@@ -26,8 +26,14 @@ void addMetric(const Planes &metric, const double *edges, const RodRange &rod, s
       y[a][s] -= force;
       y[a][s + 1] += force;
     }
-  for (const JoinedEdge &j : joined)
-    for (int a = 0; a < 3; ++a) y[a][j.frame] += scale * metric[a][j.frame] * v[a][j.frame];
+  auto add = [&](int s) {
+    for (int a = 0; a < 3; ++a) y[a][s] += scale * metric[a][s] * v[a][s];
+  };
+  for (const JoinedEdge &j : joins.edges) add(j.frame);
+  for (const JoinedBody &b : joins.bodies) {
+    add(b.position);
+    add(b.rotation);
+  }
 }
 
 BandedFactor::BandedFactor(const DofMap &dofs, RodSet set, BandedWorkspace &workspace)
@@ -238,7 +244,7 @@ PetscErrorCode multiply(Mat a, Vec x, Vec y) {
   for (int r = system->rods.begin; r < system->rods.end; ++r) {
     const RodRange &rod = dofs.rods()[r];
     system->blocks->multiply(rod, dofs.joins(r), in, out);
-    addMetric(*system->metric, system->edge_metric, rod, dofs.joinedEdges({r, r + 1}), (*system->shift)[r], in, out);
+    addMetric(*system->metric, system->edge_metric, rod, dofs.joins(r), (*system->shift)[r], in, out);
     dofs.fold(rod, out);
   }
   dofs.foldJoined(system->rods, out);

@@ -8,9 +8,10 @@ Circulatory::Circulatory(const IncrementalPotential &potential, std::vector<RodS
     : potential_(potential), islands_(std::move(islands)) {
   const RodSet rods{islands_.front().begin, islands_.back().end};
   for (const EdgeMoment &m : potential.scene().moments)
-    if (m.rod >= rods.begin && m.rod < rods.end) couples_.push_back(m);
-  std::stable_sort(couples_.begin(), couples_.end(),
-                   [](const EdgeMoment &a, const EdgeMoment &b) { return a.rod < b.rod; });
+    if (m.rod >= rods.begin && m.rod < rods.end) couples_.push_back({m});
+  for (const JoinedBody &b : potential.elements().bodies(rods))
+    if (potential.isDynamic() || potential.scene().hasCouples()) couples_.push_back({{b.rod, -1, 0, Vec3::Zero()}, &b});
+  std::stable_sort(couples_.begin(), couples_.end(), [](const Couple &a, const Couple &b) { return a.rod < b.rod; });
   int most = 0;
   for (const RodSet island : islands_) most = std::max(most, countOn(island));
   right_ = Planes(slot_size, most > 0 ? potential.dofs().slots(rods) : 0);
@@ -19,16 +20,18 @@ Circulatory::Circulatory(const IncrementalPotential &potential, std::vector<RodS
 }
 
 int Circulatory::countOn(RodSet island) const {
-  auto before = [](const EdgeMoment &m, int rod) { return m.rod < rod; };
+  auto before = [](const Couple &m, int rod) { return m.rod < rod; };
   return int(std::lower_bound(couples_.begin(), couples_.end(), island.end, before) -
              std::lower_bound(couples_.begin(), couples_.end(), island.begin, before));
 }
 
 double Circulatory::Column::dot(const Planes &x) const {
+  if (of_body) return edge.dot(x.vector(0, slot));
   return edge.dot(x.vector(0, slot + 1) - x.vector(0, slot)) + twist * x[3][slot];
 }
 
 void Circulatory::Column::addTo(Planes &x) const {
+  if (of_body) return x.setVector(0, slot, x.vector(0, slot) + edge);
   x.setVector(0, slot, x.vector(0, slot) - edge);
   x.setVector(0, slot + 1, x.vector(0, slot + 1) + edge);
   x[3][slot] += twist;
@@ -38,15 +41,18 @@ PetscErrorCode Circulatory::update(const Solve &solve) {
   PetscFunctionBeginUser;
   columns_.clear();
   strength_.clear();
-  for (const EdgeMoment &couple : couples_) {
-    const int slot = potential_.elements().rods[couple.rod].slot(couple.edge);
+  for (const Couple &couple : couples_) {
+    const bool of_body = couple.body;
+    const int slot = of_body ? couple.body->rotation : potential_.elements().rods[couple.rod].slot(couple.edge);
     const Frame f = potential_.iterate().frameAt(slot);
-    const Vec3 moment = potential_.step().load_factor * (couple.moment - couple.torque * f.tangent);
+    const Vec3 moment = of_body ? Vec3(-2 * potential_.circulation(*couple.body))
+                                : Vec3(potential_.step().load_factor * (couple.moment - couple.torque * f.tangent));
     const double size = moment.norm();
     // Two directions across the moment; their spins are what it turns into each other.
     const Vec3 along = size > 0 ? Vec3(moment / size) : f.tangent, across = along.unitOrthogonal();
     for (const Vec3 &d : {across, Vec3(along.cross(across))})
-      columns_.push_back({couple.rod, slot, d.cross(f.tangent) / f.length, d.dot(f.tangent)});
+      columns_.push_back({couple.rod, slot, of_body ? d : Vec3(d.cross(f.tangent) / f.length),
+                          of_body ? 0 : d.dot(f.tangent), of_body});
     strength_.push_back(0.5 * size);
   }
   for (std::size_t k = 0; k < solved_.size(); ++k) {

@@ -34,21 +34,37 @@ void CondensedFactor::factor(const BandedSystem &system) {
     else
       factorGroup<double>(group, system);
   std::size_t next = own_entries_;
-  auto add = [&](const RodRange &rod, int slot) {
+  auto ownBlock = [&](const RodRange &rod, int slot) {
+    Mat3 block;
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 3; ++c) {
-        double v = system.blocks->entry(rod, EdgeBlocks::vertex(std::min(r, c), std::max(r, c)))[slot - rod.first_slot];
-        if (r == c) v += (*system.shift)[rods_.begin] * (*system.metric)[r][slot];
-        entries_[next++] = v;
+        block(r, c) =
+            system.blocks->entry(rod, EdgeBlocks::vertex(std::min(r, c), std::max(r, c)))[slot - rod.first_slot];
+        if (r == c) block(r, c) += (*system.shift)[rods_.begin] * (*system.metric)[r][slot];
       }
+    return block;
+  };
+  auto add = [&](const auto &block) {
+    for (int r = 0; r < block.rows(); ++r)
+      for (int c = 0; c < block.cols(); ++c) entries_[next++] = block(r, c);
   };
   for (const Run &run : runs_) {
     const RodRange &rod = dofs_.rods()[run.rod];
-    if (run.to_separator && run.begin + run.edges == rod.edges && run.far[0] >= 0) add(rod, rod.slot(rod.edges));
+    if (!run.to_separator || run.begin + run.edges != rod.edges || run.far[0] < 0) continue;
+    const Mat3 block = ownBlock(rod, rod.slot(rod.edges));
+    if (!run.far_point) {
+      add(block);
+      continue;
+    }
+    Eigen::Matrix<double, 3, 6> by; // of the body
+    by << Mat3::Identity(), -crossMatrix<double>(armOf(run.far_point));
+    add((by.transpose() * block * by).eval());
   }
   for (const Run &run : runs_)
     for (const JoinedEdge *frame : {run.near_frame, run.far_frame})
-      if (frame) add(dofs_.rods()[run.rod], frame->frame);
+      if (frame) add(ownBlock(dofs_.rods()[run.rod], frame->frame));
+  for (const JoinedBody &b : dofs_.bodies(rods_))
+    for (const int slot : {b.position, b.rotation}) add(ownBlock(dofs_.rods()[b.rod], slot));
   regular_ = unknown_.empty() || schur_->factor(entries_);
   if (!unknown_.empty()) negative_ += schur_->negative;
 }
@@ -118,6 +134,13 @@ template <class T> void CondensedFactor::solveTo(const Group &group, const Petsc
       if (run.near[k] >= 0) separators_[run.near[k]] += lane(near[k]);
       if (run.far[k] >= 0) separators_[run.far[k]] += lane(far[k]);
     }
+    auto turn = [&](const JoinedVertex *point, const Places &places, const T *force) {
+      if (!point) return;
+      const Vec3 moment = armOf(point).cross(Vec3(lane(force[0]), lane(force[1]), lane(force[2])));
+      for (int a = 0; a < 3; ++a) separators_[places[state_size + a]] += moment[a];
+    };
+    turn(run.near_point, run.near, near);
+    turn(run.far_point, run.far, far);
   }
 }
 
@@ -126,11 +149,17 @@ template <class T> void CondensedFactor::solveFrom(const Group &group, PetscScal
   const T *const vertex = as<T>(&records_[group.record]), *const records = vertex + bordered_vertex_record;
   T near[state_size], far[state_size];
   T *const values = as<T>(&values_[group.value]);
-  auto ends = [&](const Places Run::*places, T(&to)[state_size]) {
+  auto ends = [&](const Places Run::*places, const JoinedVertex *Run::*point, T(&to)[state_size]) {
     for (int k = 0; k < state_size; ++k) {
       auto of_lane = [&](int l) {
-        const int place = (runs_[group.run[l]].*places)[k];
-        return place < 0 ? 0.0 : separators_[place];
+        const Run &run = runs_[group.run[l]];
+        const Places &at = run.*places;
+        if (at[k] < 0) return 0.0;
+        double value = separators_[at[k]];
+        if (k >= 3 || !(run.*point)) return value;
+        const Vec3 arm = armOf(run.*point);
+        const int b = (k + 1) % 3, c = (k + 2) % 3; // spin x arm
+        return value + separators_[at[state_size + b]] * arm[c] - separators_[at[state_size + c]] * arm[b];
       };
       if constexpr (std::is_same_v<T, Pack>)
         to[k] = Pack([&](auto l) { return of_lane(int(l)); });
@@ -138,8 +167,8 @@ template <class T> void CondensedFactor::solveFrom(const Group &group, PetscScal
         to[k] = of_lane(0);
     }
   };
-  ends(&Run::near, near);
-  ends(&Run::far, far);
+  ends(&Run::near, &Run::near_point, near);
+  ends(&Run::far, &Run::far_point, far);
   for (int r = 0; r < 3 && !first.from_separator; ++r) {
     near[r] = values[slot_size * (first.edges + 1) + r];
     for (int c = 0; c < state_size && first.to_separator; ++c)

@@ -137,6 +137,12 @@ PetscErrorCode NewtonSolver::findIndefinite(Vec y, bool regular, bool *any) {
           forces += weight * gradient.vector(0, j.frame).squaredNorm();
           out_of_balance += weight * (gradient.vector(0, j.frame) - rest.vector(0, j.frame)).squaredNorm();
         }
+        for (const JoinedBody &b : dofs.bodies({r, r + 1}))
+          for (const int s : {b.position, b.rotation}) {
+            const double weight = s == b.position ? 1 : 1 / std::pow(potential_->length(r), 2);
+            forces += weight * gradient.vector(0, s).squaredNorm();
+            out_of_balance += weight * (gradient.vector(0, s) - rest.vector(0, s)).squaredNorm();
+          }
       }
       indefinite = out_of_balance > little * little * forces;
     }

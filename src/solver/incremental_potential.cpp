@@ -2,6 +2,7 @@
 
 #include "tendril/energy/edge.hpp"
 #include "tendril/layout/same_vertices.hpp"
+#include "tendril/state/spin_stage.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -14,7 +15,7 @@ constexpr double epsilon = std::numeric_limits<double>::epsilon();
 IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, const Elements &elements, bool dynamic)
     : scene_(scene), dofs_(dofs), elements_(elements), retraction_(elements), axial_(scene, elements),
       terms_(makeTerms(scene, elements, axial_, dynamic)), supports_(scene, dofs, elements), start_(elements.slots),
-      known_(elements.rods.size(), Known::nothing), scales_(rodScales(scene, elements)),
+      known_(elements.rods.size(), Known::nothing), scales_(rodScales(scene, elements)), dynamic_(dynamic),
       couples_positions_(
           std::any_of(terms_.begin(), terms_.end(), [](const auto &term) { return term->couplesPositions(); })),
       joins_positions_(
@@ -40,6 +41,7 @@ void IncrementalPotential::beginStep(const State &start, const Step &step) {
 void IncrementalPotential::beginRod(const State &start, int r) {
   setRod(start, elements_, r, start_);
   iterate_.copyRod(elements_, r, start_);
+  takeArms(r);
   if (step_.twist_reference) carryFrames(*step_.rule, elements_, r, start_, reference_);
   axial_.beginStep(start_, step_, r);
   for (auto &term : terms_) term->beginStep(start, start_, step_, r);
@@ -151,8 +153,22 @@ void IncrementalPotential::assemble(RodSet islands, HessianKind hessian) {
     assembleRod(r, hessian);
     known(r) = hessian == HessianKind::none ? Known::gradient : Known::all;
   }
+  for (const JoinedVertex &j : elements_.joinedVertices(islands)) { // forces turn with the arms that they act at
+    if (!j.isOnBody() || hessian == HessianKind::none) continue;
+    const JoinedBody &body = elements_.body(elements_.bodyOf(j));
+    const Mat3 more = curvatureOfArm(derivatives_.equilibrium.vector(0, j.slot), dofs_.arm(j));
+    const RodRange &rod = elements_.rods[body.rod];
+    for (int a = 0; a < 3; ++a)
+      for (int b = a; b < 3; ++b)
+        derivatives_.blocks.entry(rod, EdgeBlocks::vertex(a, b))[body.rotation - rod.first_slot] += more(a, b);
+  }
   dofs_.foldJoined(islands, derivatives_.gradient);
   dofs_.foldJoined(islands, derivatives_.equilibrium);
+}
+
+void IncrementalPotential::takeArms(int r) {
+  for (const JoinedVertex &j : elements_.joinedVertices({r, r + 1}))
+    if (j.isOnBody()) dofs_.setArm(j, iterate_.rotationAt(j.frame) * elements_.armAsDrawn(j));
 }
 
 void IncrementalPotential::assembleRod(int r, HessianKind hessian) {
@@ -220,6 +236,7 @@ void IncrementalPotential::commit(State &state) const {
     stageRates(all(), rates);
     state.velocity = std::move(rates.velocity.vertex);
     state.twist_rate = std::move(rates.velocity.edge);
+    state.body_rate = std::move(rates.velocity.body);
   }
   commitConfiguration(state, all());
   state.time = step_.time;

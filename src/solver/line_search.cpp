@@ -224,7 +224,7 @@ bool NewtonSolver::search(RodSet island, double *lambda) {
   for (int r = island.begin; r < island.end; ++r) {
     potential_->accept(work_->trial, r);
     work_->energy[r] = work_->tried[r];
-    work_->energy_known[r] = !potential_->scene().hasCouples(); // the work of couples is counted from the iterate
+    work_->energy_known[r] = potential_->hasPotential(); // the work of couples is counted from the iterate
   }
   return true;
 }
@@ -288,6 +288,7 @@ void NewtonSolver::predict() {
         work_->increment[3][rod.slot(i)] = rod.twist ? rule.guess.atEdge(rod.first_edge + i) : 0;
       dofs.copyBehindRing(rod, work_->increment);
     }
+    potential_->setBodies(island, work_->increment, [&](const JoinedBody &b) { return rule.guess.ofBody(b.body); });
     dofs.copyJoined(island, work_->increment);
     potential_->turnFrames(island, work_->increment);
     if (!potential_->tryMove(work_->increment, 1, island, kind, work_->trial)) continue;
@@ -302,7 +303,7 @@ void NewtonSolver::predict() {
       potential_->accept(work_->trial, r);
       if (rule.lengths == RetractionKind::additive) potential_->resetAxialForces(r);
       work_->energy[r] = work_->tried[r];
-      work_->energy_known[r] = !potential_->scene().hasCouples();
+      work_->energy_known[r] = potential_->hasPotential();
     }
   }
 }

@@ -1,5 +1,6 @@
 /// Moves of the incremental potential's iterate: trials, and from the last stage of a step to its end.
 #include "tendril/energy/edge.hpp"
+#include "tendril/geometry/rotation.hpp"
 #include "tendril/solver/incremental_potential.hpp"
 
 #include <Eigen/Dense>
@@ -106,6 +107,7 @@ double IncrementalPotential::addExcess(const Planes &increment, double scale, co
 void IncrementalPotential::turnFrames(RodSet islands, Planes &increment) const {
   std::map<int, std::pair<Mat3, Vec3>> of_group;
   for (const JoinedEdge &j : elements_.joinedEdges(islands)) {
+    if (j.of_body) continue;
     const int s = elements_.rods[j.rod].slot(j.edge);
     const Frame f = iterate_.frameAt(s);
     Mat3 axes;
@@ -121,6 +123,7 @@ void IncrementalPotential::turnFrames(RodSet islands, Planes &increment) const {
     moment += of_edge * spin;
   }
   for (const JoinedEdge &j : elements_.joinedEdges(islands)) {
+    if (j.of_body) continue;
     const auto &[sum, moment] = of_group.at(j.group);
     increment.setVector(0, j.frame, sum.ldlt().solve(moment));
   }
@@ -134,6 +137,7 @@ bool IncrementalPotential::tryMove(const Planes &increment, double scale, Config
 
 void IncrementalPotential::accept(const Configuration &trial, int r) {
   iterate_.copyRod(elements_, r, trial);
+  takeArms(r);
   for (auto &term : terms_) term->moveIterate(iterate_, r);
   known(r) = Known::nothing;
 }
@@ -154,6 +158,10 @@ void IncrementalPotential::coordinates(Planes &x, RodSet rods) const {
     if (rod.twist)
       std::copy(iterate_[C::spin] + rod.first_slot, iterate_[C::spin] + rod.edgeEnd(), x[3] + rod.first_slot);
     for (const JoinedEdge &j : elements_.joinedEdges({r, r + 1})) x.setVector(0, j.frame, iterate_.positionAt(j.frame));
+    for (const JoinedBody &b : elements_.bodies({r, r + 1})) {
+      x.setVector(0, b.position, iterate_.displacementAt(b.position, start_));
+      x.setVector(0, b.rotation, iterate_.positionAt(b.rotation));
+    }
   }
 }
 
@@ -169,6 +177,8 @@ bool IncrementalPotential::moveTo(const Planes &x, RodSet rods, bool supports) {
         if (dofs_.unknown(s, a) >= 0) increment[a][s] = x[a][s] - now[a][s];
     for (const JoinedEdge &j : elements_.joinedEdges({r, r + 1}))
       if (j.isFirst()) increment.setVector(0, j.frame, x.vector(0, j.frame) - now.vector(0, j.frame));
+    for (const JoinedBody &b : elements_.bodies({r, r + 1}))
+      for (const int s : {b.position, b.rotation}) increment.setVector(0, s, x.vector(0, s) - now.vector(0, s));
     dofs_.copyBehindRing(rod, increment);
   }
   dofs_.copyJoined(rods, increment);
@@ -204,7 +214,14 @@ bool IncrementalPotential::moveOn(double time, const StageRule &end) {
   }
   turnFrames(all(), increment);
   for (const JoinedEdge &j : elements_.joinedEdges(all()))
-    if (step_.rule->fraction == 0.5) increment.setVector(0, j.frame, iterate_.positionAt(j.frame)); // as far again
+    if (step_.rule->fraction == 0.5 && !j.of_body)
+      increment.setVector(0, j.frame, iterate_.positionAt(j.frame)); // as far again
+  setBodies(all(), increment, [&](const JoinedBody &b) {
+    BodyRate moved = end.guess.ofBody(b.body).add(-1, {iterate_.displacementAt(b.position, start_)});
+    const Mat3 turned = rotationBy(moved.spin) * start_.rotationAt(b.rotation);
+    moved.spin = rotationBetween(iterate_.frameAt(b.rotation), {turned.col(0), turned.col(1), 1});
+    return moved;
+  });
   remainingMotion(all(), increment);
   for (int r = 0; r < all().end; ++r) {
     supports_.follow(r, iterate_);

@@ -123,9 +123,12 @@ PetscErrorCode NewtonSolver::refill() {
         for (int i = 0; i < rod.vertices && vertex; ++i) vertex[i] += work_->shift[r] * work_->metric[a][rod.slot(i)];
         for (const JoinedEdge &j : potential_->elements().joinedEdges({r, r + 1}))
           if (vertex) vertex[j.frame - rod.first_slot] += work_->shift[r] * work_->metric[a][j.frame];
+        for (const JoinedBody &b : potential_->elements().bodies({r, r + 1}))
+          for (const int s : {b.position, b.rotation})
+            if (vertex) vertex[s - rod.first_slot] += work_->shift[r] * work_->metric[a][s];
       }
     }
-    PetscCall(DofMap::fillMatrix(blocks, pattern_, jacobian_));
+    PetscCall(potential_->dofs().fillMatrix(blocks, pattern_, jacobian_));
   }
   PetscCall(PetscLogEventEnd(events().fill, 0, 0, 0, 0));
   PetscFunctionReturn(0);

@@ -18,6 +18,11 @@ Planes shiftMetric(const Elements &e, const DofMap &dofs) {
   }
   for (const JoinedEdge &j : e.joinedEdges(dofs.all())) // as the twist of the edge
     metric.setVector(0, j.frame, Vec3::Constant(metric[3][e.rods[j.rod].slot(j.edge)]));
+  for (const JoinedBody &b : e.bodies(dofs.all())) {
+    const MassProperties &all = e.bodyMass(b.body);
+    metric.setVector(0, b.position, Vec3::Constant(all.mass));
+    metric.setVector(0, b.rotation, Vec3::Constant(all.inertia.trace() / 3));
+  }
   return metric;
 }
 

@@ -32,6 +32,10 @@ std::vector<RodScale> rodScales(const Scene &scene, const Elements &elements) {
   }
   for (const Constraint &c : scene.constraints)
     if (c.isTie()) scales[c.to_rod].pinning += c.stiffness;
+  std::vector<int> rods_of(scene.bodies.size(), 0);
+  for (const Attachment &a : scene.attachments) ++rods_of[a.body];
+  for (const Attachment &a : scene.attachments)
+    scales[a.rod].load += bodyLoad(scene, elements, a.body) / rods_of[a.body];
   return scales;
 }
 
@@ -94,6 +98,33 @@ Residual residualOf(const Elements &elements, const Material &m, const Step &ste
   if (!m.isCable()) result.moment_floor = 4 * count * strain_noise * (bending + spinning) / (unit * scale.length);
   result.compatibility_floor = 16 * strain_noise;
   return result;
+}
+
+double bodyLoad(const Scene &scene, const Elements &elements, int b) {
+  const Body &body = scene.bodies[b];
+  const MassProperties &all = elements.bodyMass(b);
+  const double size = std::sqrt(all.inertia.trace() / all.mass);
+  return (body.gravity ? all.mass * scene.gravity.norm() : 0) + body.force.norm() + body.torque.norm() / size;
+}
+
+void includeBody(const Elements &elements, const JoinedBody &body, const Step &step, const Configuration &start,
+                 const Configuration &iterate, const Planes &out_of_balance, double unit, double load,
+                 Residual *residual) {
+  const MassProperties &all = elements.bodyMass(body.body);
+  double size = std::sqrt(all.inertia.trace() / all.mass);
+  for (const JoinedVertex &j : elements.joinedVertices({0, int(elements.rods.size())}))
+    if (j.isOnBody() && elements.bodyOf(j) == body.body) size = std::max(size, elements.armAsDrawn(j).norm());
+  const double force = out_of_balance.vector(0, body.position).norm(),
+               moment = out_of_balance.vector(0, body.rotation).norm(), by = load > 0 ? load : unit;
+  residual->force = std::max(residual->force, force / by);
+  residual->moment = std::max(residual->moment, moment / (by * size));
+  if (step.isStatic()) return;
+  const Vec3 moved = iterate.displacementAt(body.position, start);
+  const double heavy = all.mass * (moved.norm() + 1e-16 * iterate.positionAt(body.position).norm()),
+               turning = all.inertia.trace() * std::max(1.0, iterate.positionAt(body.rotation).norm()),
+               rate = 16 * epsilon / (step.dt * step.dt);
+  residual->force_floor = std::max(residual->force_floor, rate * heavy / by);
+  residual->moment_floor = std::max(residual->moment_floor, rate * turning / (by * size));
 }
 
 void Residual::include(const Residual &other) {

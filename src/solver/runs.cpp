@@ -41,6 +41,8 @@ void CondensedFactor::cut() {
   std::map<int, int> number; // of the first of three unknowns, by the slot that has them
   for (const JoinedVertex &j : dofs_.joinedVertices(rods_)) number.try_emplace(j.first_slot, 0);
   for (const JoinedEdge &j : dofs_.joinedEdges(rods_)) number.try_emplace(j.first_frame, 0);
+  for (const JoinedBody &b : dofs_.bodies(rods_))
+    for (const int slot : {b.position, b.rotation}) number.try_emplace(slot, 0);
   for (auto &[slot, begin] : number) {
     begin = dofs_.unknown(slot, 0) < 0 ? -1 : int(unknown_.size());
     for (int a = 0; a < 3 && begin >= 0; ++a) unknown_.push_back(int(dofs_.unknown(slot, a) - first));
@@ -58,6 +60,7 @@ void CondensedFactor::cut() {
     for (int a = 0; a < 3; ++a) {
       if (const int begin = number.at(j.first_slot); begin >= 0) p[a] = begin + a;
       if (edge) p[edge_at + a] = number.at(edge->first_frame) + a;
+      if (j.isOnBody()) p[state_size + a] = number.at(j.first_frame) + a;
     }
     if (const auto through = edge_number.find(j.slot); through != edge_number.end())
       for (int c = 0; c < edge_size; ++c) p[edge_at + c] = through->second + c;
@@ -88,6 +91,8 @@ void CondensedFactor::cut() {
               {},
               nullptr,
               nullptr,
+              near && near->isOnBody() ? near : nullptr,
+              far && far->isOnBody() ? far : nullptr,
               {}};
       run.near.fill(-1);
       run.far.fill(-1);
@@ -113,6 +118,10 @@ void CondensedFactor::cut() {
 /// Runs of one shape together, a pack of them where that is cheaper, and where their parts of the Schur complement go.
 void CondensedFactor::group(std::vector<int> &rows, std::vector<int> &columns) {
   constexpr int worth_a_pack = 3;
+  const PetscInt first_unknown = dofs_.firstUnknown(rods_);
+  auto numberOf = [&](PetscInt unknown) {
+    return int(std::find(unknown_.begin(), unknown_.end(), int(unknown - first_unknown)) - unknown_.begin());
+  };
   std::vector<int> order(runs_.size());
   std::iota(order.begin(), order.end(), 0);
   auto shape = [&](int k) {
@@ -121,12 +130,20 @@ void CondensedFactor::group(std::vector<int> &rows, std::vector<int> &columns) {
   };
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return shape(a) < shape(b); });
   auto block = [&](const Places &row, const Places &column) {
-    for (int r = 0; r < state_size; ++r)
-      for (int c = 0; c < state_size; ++c)
+    for (int r = 0; r < places_size; ++r)
+      for (int c = 0; c < places_size; ++c)
         if (row[r] >= 0 && column[c] >= 0) {
           rows.push_back(row[r]);
           columns.push_back(column[c]);
         }
+  };
+  // Those that three unknowns have between them.
+  auto own = [&](std::array<int, 3> place) {
+    for (const int r : place)
+      for (const int c : place) {
+        rows.push_back(r);
+        columns.push_back(c);
+      }
   };
   std::size_t records = 0, values = 0;
   auto close = [&](const int *run, int count, bool packed) {
@@ -164,20 +181,20 @@ void CondensedFactor::group(std::vector<int> &rows, std::vector<int> &columns) {
   records_.resize(records);
   values_.resize(values);
   own_entries_ = rows.size();
-  for (const Run &run : runs_) // what separators have by themselves: last vertices ...
-    if (run.to_separator && run.begin + run.edges == dofs_.rods()[run.rod].edges)
-      for (int r = 0; r < 3; ++r)
-        for (int c = 0; c < 3 && run.far[r] >= 0; ++c) {
-          rows.push_back(run.far[r]);
-          columns.push_back(run.far[c]);
-        }
-  for (const Run &run : runs_) // ... and frames
+  for (const Run &run : runs_) { // what separators have by themselves: last vertices ...
+    if (!run.to_separator || run.begin + run.edges != dofs_.rods()[run.rod].edges || run.far[0] < 0) continue;
+    Places places = run.far;
+    std::fill_n(places.begin() + 3, state_size - 3, -1);
+    block(places, places);
+  }
+  for (const Run &run : runs_) // ... frames ...
     for (const auto &[frame, places] : {std::pair(run.near_frame, &run.near), std::pair(run.far_frame, &run.far)})
-      for (int r = 0; r < 3 && frame; ++r)
-        for (int c = 0; c < 3; ++c) {
-          rows.push_back((*places)[edge_at + r]);
-          columns.push_back((*places)[edge_at + c]);
-        }
+      if (frame) own({(*places)[edge_at], (*places)[edge_at + 1], (*places)[edge_at + 2]});
+  for (const JoinedBody &b : dofs_.bodies(rods_)) // ... and bodies
+    for (const int slot : {b.position, b.rotation}) {
+      const int first = numberOf(dofs_.unknown(slot, 0));
+      own({first, first + 1, first + 2});
+    }
 }
 
 } // namespace tendril

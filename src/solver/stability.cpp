@@ -26,6 +26,9 @@ void NewtonSolver::beginMode(int start) {
           work_->increment[a][rod.slot(i)] = weight[start][a] * (1 + 0.5 * std::sin(1.7 * (slot_size * i + a)));
     for (const JoinedEdge &j : dofs.joinedEdges({r, r + 1}))
       work_->increment.setVector(0, j.frame, Vec3::Constant(weight[start][3]));
+    for (const JoinedBody &b : dofs.bodies({r, r + 1}))
+      for (const int slot : {b.position, b.rotation})
+        work_->increment.setVector(0, slot, Vec3(1, -0.5, 0.25) * weight[start][slot == b.position ? 0 : 3]);
     dofs.copyBehindRing(rod, work_->increment);
   }
   dofs.copyJoined(rods_, work_->increment);
@@ -213,7 +216,7 @@ PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::ve
         if (buckling)
           softening.multiply(rod, dofs.joins(r), v, y);
         else
-          addMetric(work_->metric, system_.edge_metric, rod, dofs.joinedEdges({r, r + 1}), work_->shift[r], v, y);
+          addMetric(work_->metric, system_.edge_metric, rod, dofs.joins(r), work_->shift[r], v, y);
         dofs.fold(rod, y);
       }
       dofs.foldJoined(rods_, y);

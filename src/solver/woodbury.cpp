@@ -49,7 +49,8 @@ WoodburyFactor::WoodburyFactor(const DofMap &dofs, RodSet rods, BandedWorkspace 
 }
 
 bool WoodburyFactor::suits(const DofMap &dofs, RodSet rods) {
-  return !dofs.ties(rods).empty() && (dofs.joinedVertices(rods).empty() || CondensedFactor::suits(dofs, rods));
+  return !dofs.ties(rods).empty() && dofs.bodies(rods).empty() &&
+         (dofs.joinedVertices(rods).empty() || CondensedFactor::suits(dofs, rods));
 }
 
 /// By what was measured (docs/performance.md, Joined rods): the capacitance, solves for its columns, and MUMPS [s].

@@ -1,6 +1,7 @@
 #include "tendril/state/commit.hpp"
 
 #include "tendril/geometry/rotation.hpp"
+#include "tendril/state/spin_stage.hpp"
 
 namespace tendril {
 
@@ -26,6 +27,12 @@ using C = Configuration;
       const Vec3 x = turned.col(0).normalized();
       state.junction_axes[j.group] = {x, orthonormalised(Vec3(turned.col(1)), x)};
     }
+    for (const JoinedBody &b : elements.bodies({r, r + 1})) {
+      const Frame f = iterate.frameAt(b.rotation);
+      state.junction_axes[b.group] = {f.tangent, orthonormalised(f.director, f.tangent)};
+      state.body_position[b.body] = iterate.positionAt(b.position);
+      state.body_position_low[b.body] = iterate.values().vector(C::position_low, b.position);
+    }
     for (int i = 0; i < rod.edges; i += lanes) {
       const int slot = rod.slot(i), live = std::min(lanes, rod.edges - i);
       const FrameOf<Pack> f = iterate.frames<Pack>(slot);
@@ -47,6 +54,7 @@ using C = Configuration;
     if (part == &out.acceleration && !rule.wants_accelerations) continue;
     part->vertex.resize(elements.vertices());
     part->edge.resize(elements.edges());
+    part->body.resize(elements.bodyCount());
   }
   for (int r = rods.begin; r < rods.end; ++r) {
     const RodRange &rod = elements.rods[r];
@@ -70,10 +78,38 @@ using C = Configuration;
     }
   }
   const Piece piece(elements, rods);
-  rule.velocity.addTo(1, piece, out.velocity.vertex, out.velocity.edge);
+  for (const JoinedBody &b : piece.bodies) {
+    BodyRate &moved = out.displacement.body[b.body];
+    moved = {iterate.displacementAt(b.position, start), turnOf(b, start, iterate), Vec3::Zero()};
+    out.velocity.body[b.body] = BodyRate().add(rate, moved);
+  }
+  rule.velocity.addTo(1, piece, out.velocity);
+  for (const JoinedBody &b : piece.bodies)
+    out.velocity.body[b.body].momentum =
+        spinStage(elements.bodyMass(b.body).inertia, start.rotationAt(b.rotation), rule, b.body)
+            .momentum(out.displacement.body[b.body].spin);
   if (!rule.wants_accelerations) return;
-  Combination().add(rule.mass * rate, out.velocity).assignTo(piece, out.acceleration.vertex, out.acceleration.edge);
-  rule.acceleration.addTo(rate, piece, out.acceleration.vertex, out.acceleration.edge);
+  Combination().add(rule.mass * rate, out.velocity).assignTo(piece, out.acceleration);
+  rule.acceleration.addTo(rate, piece, out.acceleration);
+}
+
+void settleBodies(const Elements &elements, RodSet islands, State &state) {
+  for (const JoinedBody &b : elements.bodies(islands)) {
+    BodyRate &rate = state.body_rate[b.body];
+    const Mat3 turned = rotationOf(state, b.group);
+    rate.spin = turned * elements.bodyMass(b.body).inertia.ldlt().solve(turned.transpose() * rate.momentum);
+  }
+  for (const JoinedVertex &j : elements.joinedVertices(islands)) {
+    if (!j.isOnBody()) continue;
+    const JoinedBody &b = elements.body(elements.bodyOf(j));
+    const Vec3 arm = rotationOf(state, b.group) * elements.armAsDrawn(j);
+    const int v = elements.rods[j.rod].first_vertex + j.vertex;
+    Vec3 &high = state.position[v], &low = state.position_low[v];
+    high = state.body_position[b.body];
+    low = state.body_position_low[b.body];
+    for (int a = 0; a < 3; ++a) addTwoWords(high[a], low[a], arm[a]);
+    state.velocity[v] = state.body_rate[b.body].translation + state.body_rate[b.body].spin.cross(arm);
+  }
 }
 
 } // namespace tendril

@@ -87,8 +87,25 @@ bool Retraction::apply(const C &from, const Planes &increment, double scale, int
       write(to[C::Plane(C::position + a)] + s, high);
       write(to[C::Plane(C::position_low + a)] + s, low);
     }
+  for (const JoinedVertex &j : elements_.joinedVertices({r, r + 1}))
+    if (j.isOnBody()) turnArm(from, increment, scale, j, to);
   if (kind != RetractionKind::additive && !restoreLengths(from, r, kind, to)) return false;
   return updateFrames(from, increment, scale, r, to);
+}
+
+/// A vertex goes with its body: (exp(d) - 1 - d x) arm beyond what its increment says; and so does its frame.
+void Retraction::turnArm(const C &from, const Planes &increment, double scale, const JoinedVertex &j, C &to) const {
+  const Vec3 turn = scale * increment.vector(0, j.frame);
+  const Frame before = from.frameAt(j.frame);
+  const Mat3 rotation = rotationBy(turn);
+  const Vec3 arm = from.rotationAt(j.frame) * elements_.armAsDrawn(j);
+  to.setFrame(j.frame, {rotation * before.tangent, rotation * before.director, 1});
+  to.setPosition(j.frame, from.positionAt(j.frame) + turn, Vec3::Zero());
+  const Vec3 beyond = rotation * arm - arm - turn.cross(arm);
+  Vec3 high = to.positionAt(j.slot), low = to.values().vector(C::position_low, j.slot);
+  for (int a = 0; a < 3; ++a) addTwoWords(high[a], low[a], beyond[a]);
+  to.setPosition(j.slot, high, low);
+  to.closeRing(elements_.rods[j.rod]);
 }
 
 /// Lengths that edges shall have, and their directions, by the additive positions in `to`; false when an edge vanishes
@@ -293,23 +310,32 @@ static void moveAll(const RodRange &rod, const Vec3 &by, C &to) {
     write(to[C::spin] + s, Pack(read<Pack>(from[C::spin] + s) + angle));
   }
   to.closeRing(rod);
-  for (const JoinedEdge &j : elements_.joinedEdges({r, r + 1})) {
-    const Vec3 turn = scale * increment.vector(0, j.frame);
-    const Frame before = from.frameAt(j.frame);
+  auto move = [&](int slot) {
+    Vec3 high = from.positionAt(slot), low = from.values().vector(C::position_low, slot);
+    for (int a = 0; a < 3; ++a) addTwoWords(high[a], low[a], scale * increment[a][slot]);
+    to.setPosition(slot, high, low);
+  };
+  auto turnFrame = [&](int slot, const Vec3 &turn) {
+    const Frame before = from.frameAt(slot);
     const Mat3 rotation = rotationBy(turn);
     const Frame after{rotation * before.tangent, rotation * before.director, 1};
-    to.setFrame(j.frame, after);
-    to.setPosition(j.frame, from.positionAt(j.frame) + turn, Vec3::Zero());
+    to.setFrame(slot, after);
+    to.setPosition(slot, from.positionAt(slot) + turn, Vec3::Zero());
+    return std::pair(before, after);
+  };
+  for (const JoinedBody &b : elements_.bodies({r, r + 1})) {
+    turnFrame(b.rotation, scale * increment.vector(0, b.rotation));
+    move(b.position);
+  }
+  for (const JoinedEdge &j : elements_.joinedEdges({r, r + 1})) {
+    const Vec3 turn = scale * increment.vector(0, j.frame);
+    const auto [before, after] = turnFrame(j.frame, turn);
     // About its tangent, with the whole turns that the spin has.
     const double principal = halfAngleBetween(before, after).angle(),
                  about = 0.5 * turn.dot(before.tangent + after.tangent);
     to[C::spin][j.frame] = from[C::spin][j.frame] + principal + 2 * pi * std::round((about - principal) / (2 * pi));
   }
-  for (const Tie &t : elements_.ties({r, r + 1})) {
-    Vec3 high = from.positionAt(t.copy), low = from.values().vector(C::position_low, t.copy);
-    for (int a = 0; a < 3; ++a) addTwoWords(high[a], low[a], scale * increment[a][t.copy]);
-    to.setPosition(t.copy, high, low);
-  }
+  for (const Tie &t : elements_.ties({r, r + 1})) move(t.copy);
   // Whole turns of the twist angle by continuity: the angle moves by the difference of the two spins, and by a little
   // holonomy. Half a turn is a barrier of the measure `tan`: no step leads across it.
   bool possible = true;

@@ -1,4 +1,4 @@
-#include "tendril/state/stage.hpp"
+#include "tendril/state/commit.hpp"
 
 #include <map>
 
@@ -24,6 +24,10 @@ void Configuration::copyEnds(const Elements &elements, int r, const Configuratio
   copySlots(from, rod.vertexEnd() - 1, rod.vertexEnd());
   for (const LooseCell &cell : elements.loose[r])
     for (const int slot : {cell.slot, cell.frame0, cell.frame1}) copySlots(from, slot, slot + 1);
+  for (const JoinedBody &b : elements.bodies({r, r + 1}))
+    for (const int slot : {b.position, b.rotation}) copySlots(from, slot, slot + 1);
+  for (const JoinedVertex &j : elements.joinedVertices({r, r + 1}))
+    if (j.isOnBody()) copySlots(from, j.frame, j.frame + 1);
   for (const int k : elements.constraintsOf(r)) {
     const int slot = elements.constraint_slot[k];
     copySlots(from, slot, slot + 1);
@@ -67,6 +71,14 @@ State initialState(const Scene &scene, const Elements &elements) {
   s.axial_force.assign(s.director.size(), 0.0);
   s.winding.assign(elements.cell_slot.size(), 0.0);
   s.junction_axes.assign(elements.groups, {Vec3::UnitX(), Vec3::UnitY()});
+  for (int b = 0; b < int(scene.bodies.size()); ++b) {
+    const Body &body = scene.bodies[b];
+    const MassProperties &all = elements.bodyMass(b);
+    s.body_position.push_back(all.centre);
+    s.body_position_low.push_back(Vec3::Zero());
+    s.body_rate.push_back({body.velocity + body.angular_velocity.cross(all.centre - body.own.centre),
+                           body.angular_velocity, all.inertia * body.angular_velocity});
+  }
   const Configuration c = configurationOf(s, scene, elements, 0);
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
     const Rod &rod = scene.rods[r];
@@ -83,14 +95,17 @@ State initialState(const Scene &scene, const Elements &elements) {
   const auto joined = elements.joinedVertices({0, int(elements.rods.size())});
   auto vertexOf = [&](const JoinedVertex &j) { return elements.rods[j.rod].first_vertex + j.vertex; };
   for (const JoinedVertex &j : joined) {
+    if (j.isOnBody()) continue;
     auto &[sum, mass] = momentum.try_emplace(j.first_slot, Vec3::Zero(), 0.0).first->second;
     sum += elements.mass()[j.slot] * s.velocity[vertexOf(j)];
     mass += elements.mass()[j.slot];
   }
   for (const JoinedVertex &j : joined) {
+    if (j.isOnBody()) continue;
     const auto &[sum, mass] = momentum.at(j.first_slot);
     s.velocity[vertexOf(j)] = mass > 0 ? Vec3(elements.freedom()[j.slot] * sum / mass) : Vec3(Vec3::Zero());
   }
+  if (!scene.bodies.empty()) settleBodies(elements, {0, int(elements.rods.size())}, s);
   for (const Support &support : scene.supports)
     if (support.holdsPosition()) s.velocity[elements.rods[support.rod].first_vertex + support.vertex].setZero();
   return s;
@@ -122,10 +137,15 @@ void setTargets(const Scene &scene, const Elements &elements, double motion_time
       setTarget(scene.constraints[k], elements.constraint_slot[k], motion_time, c);
 }
 
-Frame joinedFrame(const State &state, const Elements &elements, const JoinedEdge &j) {
-  const auto &[x, y] = state.junction_axes[j.group];
+Mat3 rotationOf(const State &state, int group) {
+  const auto &[x, y] = state.junction_axes[group];
   Mat3 turned;
   turned << x, y, x.cross(y);
+  return turned;
+}
+
+Frame joinedFrame(const State &state, const Elements &elements, const JoinedEdge &j) {
+  const Mat3 turned = rotationOf(state, j.group);
   const Frame &drawn = elements.frameAsDrawn(j);
   return {turned * drawn.tangent, turned * drawn.director, 1};
 }
@@ -166,6 +186,17 @@ Frame joinedFrame(const State &state, const Elements &elements, const JoinedEdge
           axialStrain<Pack>(elements.energy[r], length, read<Pack>(elements.inverseRestLength() + s)));
   }
   c.closeRing(rod);
+  auto setTurned = [&](int slot, int group) {
+    const Mat3 turned = rotationOf(state, group);
+    c.setFrame(slot, {turned.col(0), turned.col(1), 1});
+    c.setPosition(slot, Vec3::Zero(), Vec3::Zero());
+  };
+  for (const JoinedBody &b : elements.bodies({r, r + 1})) {
+    c.setPosition(b.position, state.body_position[b.body], state.body_position_low[b.body]);
+    setTurned(b.rotation, b.group);
+  }
+  for (const JoinedVertex &j : elements.joinedVertices({r, r + 1}))
+    if (j.isOnBody()) setTurned(j.frame, elements.body(elements.bodyOf(j)).group);
   for (const JoinedEdge &j : elements.joinedEdges({r, r + 1})) {
     c.setFrame(j.frame, joinedFrame(state, elements, j));
     c.setPosition(j.frame, Vec3::Zero(), Vec3::Zero());

@@ -51,6 +51,7 @@ files = {
     "deep.yaml": b"[" * 5000,
     "alias.yaml": b"rods: &a [*a]\n",
     "open.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+    "inside_out.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 4 2\nf 1 3 4\nf 2 4 3\n",
     "missing.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n",
     "points.obj": b"v 0 0 0\nv 1 0 0\n",
     "cut.stl": bytes(80) + (12).to_bytes(4, "little") + bytes(150),
@@ -101,6 +102,14 @@ def rod(shape_text):
     return (shape, shape_text)
 
 
+def bodies(text, ties="", more=""):
+    """Bodies of a scene, a block each, and the constraints that tie rods to them."""
+    return (support, f"{support}\nbodies: [{text}]\nconstraints: [{ties}]{more}")
+
+
+cube = "{name: cube, box: {size: [0.2, 0.2, 0.2]}, density: 1000}"
+
+
 def motion(text, kind="clamp"):
     return (support, f"  - {{vertex: 0, type: {kind}, motion: {text}}}")
 
@@ -129,7 +138,7 @@ rows = [
     ("unknown rod", ("{vertex: 0", "{rod: b, vertex: 0"), [], ["scene.yaml:8", "no rod 'b'"]),
     ("held twice", ("  - {vertex: 0, type: clamp}", "  - {vertex: 0, type: clamp}\n  - {vertex: 0, type: pin}"), [], ["scene.yaml:9", "held twice"]),
     ("constraint without a stiffness", (support, support + "\nconstraints: [{type: pin, vertex: 4}]"), [], ["scene.yaml:9", "'stiffness' is missing", "support of 'type: pin'"]),
-    ("constraint of no kind", (support, support + "\nconstraints: [{type: weld, vertex: 4, stiffness: 1}]"), [], ["scene.yaml:9", "pin", "rotation"]),
+    ("constraint of no kind", (support, support + "\nconstraints: [{type: glue, vertex: 4, stiffness: 1}]"), [], ["scene.yaml:9", "pin", "rotation", "weld"]),
     ("constraint to a body", (support, support + "\nconstraints: [{type: pin, vertex: 4, stiffness: 1, to: cube}]"), [], ["scene.yaml:9", "world"]),
     ("two ends that are held", (support, support + "\n  - {vertex: 4, type: pin}\nconstraints: [{type: pin, vertex: 4, stiffness: 1, to: {vertex: 0}}]"), [], ["scene.yaml:10", "supports hold vertex 4", "vertex 0"]),
     ("constraint on a held vertex", (support, support + "\nconstraints: [{type: pin, vertex: 0, stiffness: 1}]"), [], ["scene.yaml:9", "held by a support"]),
@@ -209,6 +218,58 @@ rows = [
     ("accuracy of rods that pins join", (support, support + "\nconstraints: [{type: pin, vertex: 4, to: {vertex: 1}, stiffness: 1}]"), ["-mode", "static", "-accuracy", "1e-3"], ["-accuracy", "join"]),
     ("rods that pins join, one by one", (support, support + "\nconstraints: [{type: pin, vertex: 4, to: {vertex: 1}, stiffness: 1}]"), ["-pc_factor_mat_solver_type", "banded"], ["-pc_factor_mat_solver_type", "woodbury"]),
     ("unknown key of a constraint", (support, support + "\nconstraints: [{type: pin, vertex: 4, stifness: 1}]"), [], ["scene.yaml:9", "stiffness"]),
+    # bodies and what ties rods to them
+    ("body of two shapes", bodies("{sphere: {radius: 1}, box: {size: [1, 1, 1]}, density: 1}"), [], ["scene.yaml:9", "two shapes, 'box' and 'sphere'", "keep one"]),
+    ("body of density and mass", bodies("{sphere: {radius: 1}, density: 1, mass: 1}"), [], ["scene.yaml:9", "'density' and 'mass'", "one of them away"]),
+    ("body without mass", bodies("{sphere: {radius: 1}}"), [], ["scene.yaml:9", "'sphere' alone has no mass", "'density'"]),
+    ("body of nothing", bodies("{position: [1, 0, 0]}"), [], ["scene.yaml:9", "a body needs a shape", "'inertia'"]),
+    ("density without a shape", bodies("{density: 1000}"), [], ["scene.yaml:9", "'density' is for a body with a shape", "'mass' and 'inertia'"]),
+    ("body that is a point", bodies("{mass: 1}"), [], ["scene.yaml:9", "a point", "give it a shape", "'inertia'"]),
+    ("misspelt inertia", bodies("{mass: 1, inertai: [1, 1, 1]}"), [], ["scene.yaml:9", "unknown key 'inertai'", "did you mean 'inertia'"]),
+    ("misspelt shape of a body", bodies("{bax: {size: [1, 1, 1]}, density: 1}"), [], ["scene.yaml:9", "unknown key 'bax'", "did you mean 'box'"]),
+    ("body of no mass", bodies("{mass: 0, inertia: [1, 1, 1]}"), [], ["scene.yaml:9", "'mass' must be greater than zero"]),
+    ("body of negative mass", bodies("{sphere: {radius: 1}, mass: -3}"), [], ["scene.yaml:9", "'mass' must be greater than zero"]),
+    ("body of negative density", bodies("{sphere: {radius: 1}, density: -3}"), [], ["scene.yaml:9", "'density' must be greater than zero"]),
+    ("inertia of one number", bodies("{mass: 1, inertia: 0.1}"), [], ["scene.yaml:9", "list of 3 numbers", "[Ixx, Iyy, Izz, Ixy, Ixz, Iyz]"]),
+    ("inertia of four numbers", bodies("{mass: 1, inertia: [1, 1, 1, 0]}"), [], ["scene.yaml:9", "or of 6", "found 4"]),
+    ("inertia of no body", bodies("{mass: 1, inertia: [1, 1, 3]}"), [], ["scene.yaml:9", "no body has this 'inertia'", "more than the sum"]),
+    ("inertia that is not positive", bodies("{mass: 1, inertia: [1, 1, 1, 2, 0, 0]}"), [], ["scene.yaml:9", "no body has this 'inertia'", "must be positive"]),
+    ("inertia that is not finite", bodies("{mass: 1, inertia: [1, 1, .nan]}"), [], ["scene.yaml:9", "finite"]),
+    ("centre of a shape", bodies("{sphere: {radius: 1}, mass: 1, centre: [0, 0, 0.1]}"), [], ["scene.yaml:9", "'inertia' about it"]),
+    ("box of a body without size", bodies("{box: {size: [1, 0, 1]}, mass: 1}"), [], ["scene.yaml:9", "'size' must be positive"]),
+    ("endless cylinder of a body", bodies("{cylinder: {radius: 1}, density: 1}"), [], ["scene.yaml:9", "needs the key 'length'"]),
+    ("axis of zero of a body", bodies("{cylinder: {radius: 1, length: 1, axis: [0, 0, 0]}, density: 1}"), [], ["scene.yaml:9", "'axis' must not be zero"]),
+    ("body of no file", bodies("{mesh: {file: none.obj}, density: 1}"), [], ["scene.yaml:9", "none.obj", "cannot be opened"]),
+    ("body that is open", bodies("{mesh: {file: open.obj}, density: 1}"), [], ["scene.yaml:9", "open.obj", "not closed", "needs a closed surface"]),
+    ("body that is inside out", bodies("{mesh: {file: inside_out.obj}, density: 1}"), [], ["scene.yaml:9", "inside_out.obj", "inside out", "anticlockwise"]),
+    ("body named twice", bodies(f"{cube}, {cube}"), [], ["scene.yaml:9", "name 'cube' is there already", "another 'name'"]),
+    ("body whose name is a number", bodies("{name: 3, sphere: {radius: 1}, mass: 1}"), [], ["scene.yaml:9", "must not be a number"]),
+    ("body whose name another has", bodies("{name: body1, sphere: {radius: 1}, mass: 1}, {sphere: {radius: 1}, mass: 1}"), [], ["scene.yaml:9", "give this body a 'name'"]),
+    ("body that is moved", bodies("{name: cube, sphere: {radius: 1}, mass: 1, motion: {velocity: [1, 0, 0]}}"), [], ["scene.yaml:9", "unknown key 'motion'"]),
+    ("weld to nothing", (support, support + "\nconstraints: [{type: weld, vertex: 4}]"), [], ["scene.yaml:9", "'body', which is missing", "'type: clamp'", "'type: rigid'"]),
+    ("weld without bodies", (support, support + "\nconstraints: [{type: weld, vertex: 4, body: cube}]"), [], ["scene.yaml:9", "no body 'cube'", "has no 'bodies'"]),
+    ("weld to an unknown body", bodies(cube, "{type: weld, vertex: 4, body: cub}"), [], ["scene.yaml:10", "no body 'cub'", "('cube')", "from 0 to 0", "did you mean 'cube'"]),
+    ("weld to body 1", bodies(cube, "{type: weld, vertex: 4, body: 1}"), [], ["scene.yaml:10", "no body '1'", "from 0 to 0"]),
+    ("weld out of range", bodies(cube, "{type: weld, vertex: 5, body: cube}"), [], ["scene.yaml:10", "out of range", "0 to 4"]),
+    ("weld nowhere", bodies(cube, "{type: weld, body: cube}"), [], ["scene.yaml:10", "needs the key 'vertex'"]),
+    ("weld of a held vertex", bodies(cube, "{name: grip, type: weld, vertex: 0, body: cube}"), [], ["scene.yaml:10", "support of 'type: clamp'", "'grip' ties it to body 'cube'", "take one of the two away"]),
+    ("two ties of a vertex", bodies(cube, "{name: one, type: weld, vertex: 4, body: cube}, {name: two, type: pin, vertex: last, body: 0}"), [], ["scene.yaml:10", "'one' already", "'two'", "take one of the two away"]),
+    ("tie named twice", bodies(cube, "{name: one, type: weld, vertex: 4, body: cube}, {name: one, type: pin, vertex: 3, stiffness: 1}"), [], ["scene.yaml:10", "name 'one' is there already"]),
+    ("weld of a cable", ("density: 1000}\n" + "supports:\n" + support, "density: 1000, flexural_stiffness: 0}\n" + f"bodies: [{cube}]\nconstraints: [{{type: weld, vertex: 4, body: cube}}]"), [], ["scene.yaml:8", "no flexural stiffness", "'type: pin'"]),
+    ("weld against its edge", bodies(cube, "{type: weld, vertex: 4, body: cube, tangent: [-1, 1, 0]}"), [], ["scene.yaml:10", "135 degrees off edge 3", "turn it round"]),
+    ("director of a weld", bodies(cube, "{type: weld, vertex: 4, body: cube, director: [1, 1, 0]}"), [], ["scene.yaml:10", "not normal to the tangent"]),
+    ("tangent of a weld inside", bodies(cube, "{type: weld, vertex: 2, body: cube, tangent: [1, 0, 0]}"), [], ["scene.yaml:10", "'tangent' is for the ends", "welded as drawn"]),
+    ("tangent of a pin to a body", bodies(cube, "{type: pin, vertex: 4, body: cube, tangent: [1, 0, 0]}"), [], ["scene.yaml:10", "'tangent' is for 'type: weld'"]),
+    ("spring to a body", bodies(cube, "{type: pin, vertex: 4, body: cube, stiffness: 1e3}"), [], ["scene.yaml:10", "leave 'stiffness' away"]),
+    ("rotation to a body", bodies(cube, "{type: rotation, edge: 3, body: cube, stiffness: 1}"), [], ["scene.yaml:10", "write 'type: weld'"]),
+    ("damper to a body", bodies(cube, "{type: pin, vertex: 4, body: cube, damping: 1}"), [], ["scene.yaml:10", "'damping' has no meaning"]),
+    ("weld that moves", bodies(cube, "{type: weld, vertex: 4, body: cube, motion: {velocity: [1, 0, 0]}}"), [], ["scene.yaml:10", "'motion' has no meaning"]),
+    ("weld of an edge", bodies(cube, "{type: weld, edge: 3, body: cube}"), [], ["scene.yaml:10", "'edge' has no meaning", "'vertex'"]),
+    ("tie to a body and a vertex", bodies(cube, "{type: pin, vertex: 4, body: cube, to: {vertex: 1}}"), [], ["scene.yaml:10", "'to' and 'body'"]),
+    ("weld to a vertex", bodies(cube, "{type: weld, vertex: 4, to: {vertex: 1}}"), [], ["scene.yaml:10", "'body', which is missing"]),
+    ("gravity on a rod and not on its body", bodies(cube.replace("density", "gravity: false, density"), "{type: pin, vertex: 4, body: cube}"), [], ["scene.yaml:10", "rod 'a'", "not on body 'cube'", "the same 'gravity'"]),
+    ("tied vertex in a junction", bodies(cube, "{name: grip, type: pin, vertex: 4, body: cube}", "\njunctions: [{type: ball, members: [{vertex: 3}, {vertex: 4}], within: 1}]"), [], ["scene.yaml:11", "'grip'", "'junction0' joins it"]),
+    ("body in a frame that turns", bodies(cube, "", "\nrotation: {angular_velocity: [0, 0, 1]}"), ["-mode", "static"], ["scene.yaml:11", "'rotation'", "bodies"]),
     ("no shape", (shape, "closed: false"), [], ["scene.yaml:4", "exactly one shape"]),
     ("poisson and shear", ("poisson: 0.3", "poisson: 0.3, shear: 1e6"), [], ["scene.yaml:6", "found both"]),
     ("neither poisson nor shear", ("poisson: 0.3, ", ""), [], ["scene.yaml:6", "found none"]),

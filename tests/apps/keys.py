@@ -72,10 +72,23 @@ def exampleScene(path, value):
         put(scene, "loads[].torque", 1e-4)
     if path.startswith("loads[]"):
         put(scene, "loads[].edge" if name in ("torque", "moment", "edge") else "loads[].vertex", "last")
+    if path.startswith("bodies[]") or path == "constraints[].body":
+        body = scene.setdefault("bodies", [{}])[0]
+        body.setdefault("name", "cube")
+        if not any(shape in body for shape in ("box", "sphere", "capsule", "cylinder", "mesh")):
+            body["sphere"] = {"radius": 0.1}
+        if "mesh" in body:
+            body["mesh"]["file"] = os.path.abspath(f"{root}/data/meshes/plate.obj")
+        if "mass" not in body:
+            body.setdefault("density", 1000)
+        if "centre" in body:
+            body["inertia"] = [0.05, 0.05, 0.06]
     if path.startswith("constraints[]"):
         turns = name in ("edge", "tangent", "director", "measure", "angular_velocity")
         scene["constraints"][0]["type"] = "rotation" if turns else "pin"
         put(scene, "constraints[].edge" if turns else "constraints[].vertex", "last")
+        if path != "constraints[].body":
+            put(scene, "constraints[].stiffness", 1e3)
     if path.startswith("constraints[].to."):  # a second rod
         put(scene, "constraints[].rod", 0)
         put(scene, "constraints[].to.rod", 1)

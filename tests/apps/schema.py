@@ -74,7 +74,8 @@ READER_ONLY = ("cannot be opened", "must not be zero", "normal to", "not normal"
                "has no twist", "cannot carry", "no twist to fix", "must increase", "contradicts", "free to move as a whole", "pin holds",
                "holds no position", "comes out as", "is for -mode static", "deep in collider", "must not exceed its radius", "must be larger than 'bore'",
                "both zero", "natural curvature", "a junction needs", "is in junction", "no two vertices", "two supports hold", "in a rigid group",
-               "a junction joins what", "'group' is for", "is for 'shared: true'")
+               "a junction joins what", "'group' is for", "is for 'shared: true'", "no body", "take one of the two away", "degrees off", "the same 'gravity'", "no flexural stiffness that a weld",
+               "is for the ends of a rod", "comes out as", "'size' must be positive", "the inertia of the shape", "with the name", "must not be a number")
 
 
 def reads(scene, folder, name):

@@ -43,10 +43,17 @@ public:
       for (Vec3 &axis : of_group)
         for (double &x : axis) (*this)(x);
   }
+  void operator()(std::vector<BodyRate> &rates) { // as many as there are bodies
+    for (BodyRate &rate : rates)
+      for (Vec3 *v : {&rate.translation, &rate.spin, &rate.momentum})
+        for (double &x : *v) (*this)(x);
+  }
   void operator()(std::vector<Rates> &all) {
     all.resize(2);
     for (Rates &rates : all) {
       rates.edge.resize(elements_.edges());
+      rates.body.resize(elements_.bodyCount());
+      (*this)(rates.body);
       (*this)(rates.vertex);
       (*this)(rates.edge);
     }
@@ -89,6 +96,17 @@ Scene turnedScene(int edges = 8) {
   return scene;
 }
 
+/// The same with a body on the ring.
+Scene sceneWithBody() {
+  Scene scene = turnedScene();
+  Body body;
+  body.own = boxMass({0.1, 0.2, 0.3}, 100).moved(Mat3::Identity(), {0, 2, 0});
+  scene.bodies = {body};
+  scene.attachments = {{"tie", 1, 2, 0, true, frameAtVertex(scene.rods[1], 2)}};
+  scene.hostBodies();
+  return scene;
+}
+
 LoopSettings settingsOf(const std::string &integrator) {
   LoopSettings settings = dynamics(0.01, 1);
   settings.integrator.name = integrator;
@@ -109,6 +127,7 @@ struct Filled {
     prepare(sim, scene, settings);
     Filler fill(*sim.elements);
     eachField(sim.state, fill);
+    for (auto *places : {&sim.state.body_position, &sim.state.body_position_low}) places->resize(scene.bodies.size());
     eachField(control, fill);
   }
   void write(const std::string &path) const { writeCheckpoint(path, sim, control, facts); }
@@ -134,7 +153,7 @@ struct Taken {
 TEST(Checkpoint, HoldsEveryField) {
   const Folder folder;
   const std::string path = folder.path("checkpoint.h5");
-  Scene scene = turnedScene();
+  Scene scene = sceneWithBody();
   scene.junctions = {{"corner", {{0, 2, 0}}, 1}};
   const Filled written(scene);
   written.write(path);

@@ -135,6 +135,8 @@ TEST(Trajectory, EveryFieldHasAUnitAndAPlace) {
   ball.kind = "sphere";
   ball.shape = makeSphere(1);
   ball.motion.velocity = Vec3(1, 0, 0);
+  Body &body = scene.bodies.emplace_back();
+  body.own = sphereMass(0.1, 1000);
   const Written written(scene);
   for (const std::string &name : TrajectoryWriter::fieldNames()) {
     EXPECT_NE(written.attribute("state/" + name, "unit"), "(none)") << name;

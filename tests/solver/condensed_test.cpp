@@ -8,7 +8,7 @@ namespace {
 
 /// One hundred nets, most of them indefinite: solutions as of the dense matrix, negative pivots as MUMPS and the
 /// eigenvalues have them.
-TEST(Condensed, SolvesAndCountsAsTheWholeMatrixDoes) {
+void expectAsWhole(bool bodies) {
   Random random(11);
   int indefinite = 0;
   for (int repeat = 0; repeat < 100; ++repeat) {
@@ -16,6 +16,7 @@ TEST(Condensed, SolvesAndCountsAsTheWholeMatrixDoes) {
     const int rods = 4 + pick(random, 20), nodes = 3 + pick(random, 6);
     draw(net, random, rods, nodes, repeat % 3 > 0);
     if (net.scene.junctions.empty()) continue;
+    if (bodies) embody(net);
     fill(net, random, repeat % 4 == 0 ? 14.0 : repeat % 4 == 1 ? 3.0 : -1.0);
     ASSERT_TRUE(CondensedFactor::suits(net.dofs, net.dofs.all()));
     BandedWorkspace workspace;
@@ -25,6 +26,9 @@ TEST(Condensed, SolvesAndCountsAsTheWholeMatrixDoes) {
   }
   EXPECT_GT(indefinite, 50);
 }
+
+TEST(Condensed, SolvesAndCountsAsTheWholeMatrixDoes) { expectAsWhole(false); }
+TEST(Condensed, SolvesWithBodiesAsTheWholeMatrixDoes) { expectAsWhole(true); }
 
 } // namespace
 } // namespace tendril::test

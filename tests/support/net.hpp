@@ -67,6 +67,32 @@ inline void draw(Net &net, Random &random, int rods, int nodes, bool frames) {
   }
 }
 
+/// Bodies in place of every other junction, with its vertices at random arms.
+inline void embody(Net &net) {
+  std::vector<Junction> left;
+  for (std::size_t k = 0; k < net.scene.junctions.size(); ++k) {
+    const Junction &junction = net.scene.junctions[k];
+    if (k % 2 == 1) {
+      left.push_back(junction);
+      continue;
+    }
+    Body body;
+    body.own = {1, Vec3::Zero(), Mat3::Identity()};
+    for (const Junction::Member &m : junction.members) {
+      const bool held = std::any_of(net.scene.supports.begin(), net.scene.supports.end(), [&](const Support &s) {
+        return s.rod == m.rod && s.vertex == m.vertex;
+      });
+      const Rod &rod = net.scene.rods[m.rod];
+      if (!held)
+        net.scene.attachments.push_back({"a", m.rod, m.vertex, int(net.scene.bodies.size()), m.group >= 0,
+                                         frameAtVertex(rod, m.vertex)});
+    }
+    net.scene.bodies.push_back(body);
+  }
+  net.scene.junctions = left;
+  net.scene.hostBodies();
+}
+
 /// Ties between vertices of any rods, some of one rod, some of vertices in junctions or held.
 inline void tie(Net &net, Random &random, int count) {
   for (int k = 0; k < count; ++k) {
@@ -86,6 +112,8 @@ inline void tie(Net &net, Random &random, int count) {
 inline void fill(Net &net, Random &random, double diagonal) {
   ASSERT_EQ(net.dofs.setUp(net.scene), PetscErrorCode(0));
   const RodSet all = net.dofs.all();
+  for (const JoinedVertex &j : net.dofs.joinedVertices(all))
+    if (j.isOnBody()) net.dofs.setArm(j, random.vector());
   net.blocks = EdgeBlocks(net.dofs.slots());
   net.blocks.setOrigin(net.dofs.rods().front().first_slot);
   net.metric = net.dofs.makePlanes();
@@ -118,6 +146,13 @@ inline void fill(Net &net, Random &random, double diagonal) {
         net.blocks.entry(rod, EdgeBlocks::across(r, c))[j.cell - rod.first_slot] = random();
     }
   }
+  for (const JoinedBody &b : net.dofs.bodies(all))
+    for (const int slot : {b.position, b.rotation})
+      for (int r = 0; r < 3; ++r)
+        for (int c = r; c < 3; ++c)
+          net.blocks.entry(net.dofs.rods()[b.rod],
+                           EdgeBlocks::vertex(r, c))[slot - net.dofs.rods()[b.rod].first_slot] =
+              random() + (r == c ? diagonal : 0);
   for (const Tie &t : net.dofs.ties(all)) // often of rank two or one
     for (int r = 0; r < 3; ++r)
       net.blocks.entry(net.dofs.rods()[t.rod], EdgeBlocks::vertex(r, r))[t.copy - net.dofs.rods()[t.rod].first_slot] =
@@ -125,7 +160,7 @@ inline void fill(Net &net, Random &random, double diagonal) {
   net.system = {&net.dofs, all, &net.blocks, &net.metric, &net.active, &net.shift};
   DofMap::Pattern pattern;
   ASSERT_EQ(net.dofs.createMatrix(all, false, net.matrix.out(), &pattern), PetscErrorCode(0));
-  ASSERT_EQ(DofMap::fillMatrix(net.blocks, pattern, net.matrix), PetscErrorCode(0));
+  ASSERT_EQ(net.dofs.fillMatrix(net.blocks, pattern, net.matrix), PetscErrorCode(0));
   const PetscInt n = net.dofs.unknowns();
   net.dense = Eigen::MatrixXd::Zero(n, n);
   for (PetscInt r = 0; r < n; ++r) {

@@ -36,12 +36,6 @@ template <Measure measure, class T> T cellEnergy(const FrameOf<T> &f0, const Fra
   return energy;
 }
 
-template <class T> Matrix3<T> crossMatrix(const Vector3<T> &v) {
-  Matrix3<T> m;
-  m << T(0.0), -v[2], v[1], v[2], T(0.0), -v[0], -v[1], v[0], T(0.0);
-  return m;
-}
-
 /// Gradient of a cell's energy over its unknowns alone (see cellDerivatives).
 template <Measure measure, class T>
 std::array<T, cell_size> cellGradient(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell) {

@@ -48,13 +48,13 @@ struct Derivatives {
 
 /// Stored and kinetic energies of a state, by name [J]; centrifugal potential counts as gravity.
 struct EnergyBudget {
-  double kinetic = 0, stretch = 0, bend = 0, twist = 0, gravity = 0, constraint = 0, contact = 0;
-  double total() const { return kinetic + stretch + bend + twist + gravity + constraint + contact; }
+  double kinetic = 0, stretch = 0, bend = 0, twist = 0, gravity = 0, constraint = 0, contact = 0, body_kinetic = 0;
+  double total() const { return kinetic + stretch + bend + twist + gravity + constraint + contact + body_kinetic; }
   EnergyBudget &operator+=(const EnergyBudget &other);
 };
 inline constexpr double EnergyBudget::*named_energies[] = {
-    &EnergyBudget::kinetic, &EnergyBudget::stretch,    &EnergyBudget::bend,   &EnergyBudget::twist,
-    &EnergyBudget::gravity, &EnergyBudget::constraint, &EnergyBudget::contact};
+    &EnergyBudget::kinetic, &EnergyBudget::stretch,    &EnergyBudget::bend,    &EnergyBudget::twist,
+    &EnergyBudget::gravity, &EnergyBudget::constraint, &EnergyBudget::contact, &EnergyBudget::body_kinetic};
 /// Those of rods that may be on several ranks.
 struct EnergySums {
   std::array<ExactSum, std::size(named_energies)> sums;
@@ -78,6 +78,11 @@ public:
   virtual void moveIterate(const Configuration & /*iterate*/, int /*rod*/) {}
   /// Called when the load factor changes within a step.
   virtual void setLoadFactor(double /*factor*/) {}
+  /// What the derivative of its gradient by the spin of a body has beyond a symmetric matrix, as the vector c of c x
+  /// spin [N m].
+  virtual Vec3 circulation(const JoinedBody & /*body*/, const Configuration & /*configuration*/) const {
+    return Vec3::Zero();
+  }
   /// Whether it is the scene's loads.
   virtual bool isLoad() const { return false; }
   /// Whether its Hessian couples the coordinates of one vertex other than through edges: see
@@ -165,6 +170,7 @@ std::unique_ptr<Term> makeBendTwist(const Scene &, const Elements &);
 std::unique_ptr<Term> makeStretch(const Elements &, const AxialLaw &);
 std::unique_ptr<Term> makeInertia(const Scene &, const Elements &);
 std::unique_ptr<Term> makeLoad(const Scene &, const Elements &);
+std::unique_ptr<Term> makeBodyMotion(const Scene &, const Elements &, bool dynamic);
 
 /// What an end couple stores in the half edge beyond the last cell, by bending about the first and second director and
 /// by twist [J]. That half turns by moment x compliance, so the couple does twice this work at the end of the rod; the

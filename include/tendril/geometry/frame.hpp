@@ -23,6 +23,13 @@ template <class T> Vector3<T> transport(const Vector3<T> &v, const Vector3<T> &f
   return v - (from + to) * s;
 }
 
+/// Matrix of the cross product with a vector.
+template <class T> Matrix3<T> crossMatrix(const Vector3<T> &v) {
+  Matrix3<T> m;
+  m << T(0.0), -v[2], v[1], v[2], T(0.0), -v[0], -v[1], v[0], T(0.0);
+  return m;
+}
+
 /// Rotates `v`, normal to the unit vector `axis`, by `angle` [rad] about it.
 template <class T> Vector3<T> rotateAbout(const Vector3<T> &v, const Vector3<T> &axis, const T &angle) {
   return v * cosine(angle) + axis.cross(v) * sine(angle);

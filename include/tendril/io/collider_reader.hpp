@@ -7,6 +7,11 @@
 
 namespace tendril {
 
+/// Turns the axis of a shape, z, to a unit vector.
+Mat3 turnTo(const Vec3 &axis);
+/// The axis that a key gives, of unit length.
+Vec3 axisOf(YamlMap &map, KeyOf<KeyType::vector> key);
+
 /// The block of the scene; what it does not say is NaN.
 ContactSettings readContact(YamlMap &scene);
 /// What the block of a rod says.

@@ -17,6 +17,7 @@ enum class KeyType {
   vector,  ///< three numbers
   pair,    ///< two numbers, or one for both
   vectors, ///< a list of vectors
+  inertia, ///< three numbers, or six of a symmetric matrix
   index,   ///< a whole number from 0, or `last`
   rod,     ///< a name, a number from 0, or `all`
   rows,    ///< rows of a table

@@ -36,6 +36,9 @@ struct SceneFile {
   std::map<std::pair<int, int>, std::string> joined; ///< vertices in junctions, by rod and number: which
   /// Numbers of supports by the rods and vertices that they hold.
   std::map<std::pair<int, int>, std::vector<int>> supports_at;
+  std::map<std::string, int> body_numbers; ///< by names
+  /// Constraints that tie vertices to bodies, by rod and vertex.
+  std::map<std::pair<int, int>, std::string> attached;
   std::vector<Drawing> drawings; ///< per rod
   RunSettings run;
   std::vector<std::string> notes; ///< to be told at the start: defaults of materials, and warnings

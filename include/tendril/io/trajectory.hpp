@@ -79,8 +79,8 @@ private:
   void writeSupports();
   void writeConstraints(); ///< name, type, rod, and the vertex of a pin or edge of a rotation
   void writeColliders();   ///< name, shape, its parameters, and position and rotation without motion
+  void writeBodies();      ///< name, shape, its parameters, mass properties as drawn; and what is tied to them
   void writeMaterials();
-  std::string xdmfFrame(bool edges) const;
   void writeXdmf() const;
 };
 

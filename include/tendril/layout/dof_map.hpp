@@ -47,16 +47,31 @@ public:
   std::span<const JoinedVertex> joinedVertices(RodSet rods) const { return joined_vertices_.of(rods); }
   std::span<const JoinedEdge> joinedEdges(RodSet rods) const { return joined_edges_.of(rods); }
   std::span<const Tie> ties(RodSet rods) const { return ties_.of(rods); }
-  Joins joins(int rod) const { return {joinedEdges({rod, rod + 1}), ties({rod, rod + 1})}; }
-  /// Calls visit(slot) for the slots beside rods that have unknowns or copies: frames of junctions, ends of ties.
+  std::span<const JoinedBody> bodies(RodSet rods) const { return bodies_.of(rods); }
+  Joins joins(int rod) const {
+    const RodSet one{rod, rod + 1};
+    return {joinedEdges(one), ties(one), bodies(one)};
+  }
+  /// Calls visit(slot) for the slots beside rods that have unknowns or copies: frames of junctions, bodies, ends of
+  /// ties.
   template <class Visit> void forBeside(RodSet rods, Visit visit) const {
     for (const JoinedEdge &j : joinedEdges(rods)) visit(j.frame);
+    for (const JoinedBody &b : bodies(rods)) {
+      visit(b.position);
+      visit(b.rotation);
+    }
+    for (const JoinedVertex &j : joinedVertices(rods))
+      if (j.isOnBody()) visit(j.frame);
     for (const Tie &t : ties(rods)) visit(t.copy);
   }
+  /// From the centre of mass of its body to a vertex, at the iterate [m].
+  const Vec3 &arm(const JoinedVertex &j) const { return arms_[std::size_t(j.number)]; }
+  void setArm(const JoinedVertex &j, const Vec3 &arm) { arms_[std::size_t(j.number)] = arm; }
   const ByRod<Tie> &ties() const { return ties_; }
   const ByRod<JoinedVertex> &joinedVertices() const { return joined_vertices_; }
   const ByRod<JoinedEdge> &joinedEdges() const { return joined_edges_; }
-  int groups() const { return groups_; } ///< rigid ones of all junctions
+  const ByRod<JoinedBody> &bodies() const { return bodies_; }
+  int groups() const { return groups_; } ///< rigid ones of all junctions, and bodies
   Planes makePlanes() const { return Planes(slot_size, slots_); }
 
   DM dm() const { return dm_; }
@@ -65,6 +80,9 @@ public:
   struct Pattern {
     std::vector<std::ptrdiff_t> source;
     std::vector<double> entries;
+    /// Components of arms that an entry is multiplied by, three times the number of the arm and the axis, or -1; empty
+    /// where there are no bodies.
+    std::vector<std::array<int, 2>> factor;
   };
   /// For slots of some rods that are copies in junctions, those that have the unknowns.
   std::unordered_map<int, int> firstSlots(RodSet rods) const;
@@ -72,13 +90,14 @@ public:
   /// \param joins as EdgeBlocks::joins
   PetscErrorCode createMatrix(RodSet rods, bool joins, Mat *matrix, Pattern *pattern) const;
   /// Puts their blocks into it, both triangles.
-  static PetscErrorCode fillMatrix(const EdgeBlocks &blocks, Pattern &pattern, Mat matrix);
+  PetscErrorCode fillMatrix(const EdgeBlocks &blocks, Pattern &pattern, Mat matrix) const;
 
   /// Copies of the first vertices and edge of a closed rod behind its last.
   void copyBehindRing(const RodRange &rod, Planes &increment) const;
   /// Adds what was summed into the copies behind a ring to the slots they stand for.
   void fold(const RodRange &rod, Planes &sums) const;
-  /// Positions of first members and of ends of ties, and spins of first frames, to their copies in whole islands.
+  /// Positions of first members and of ends of ties, spins of first frames, and the motions of bodies, to what follows
+  /// them in whole islands, to first order.
   void copyJoined(RodSet islands, Planes &increment) const;
   /// Adds what was summed into those copies to what they stand for.
   void foldJoined(RodSet islands, Planes &sums) const;
@@ -108,6 +127,8 @@ private:
   ByRod<JoinedVertex> joined_vertices_;
   ByRod<JoinedEdge> joined_edges_;
   ByRod<Tie> ties_;
+  ByRod<JoinedBody> bodies_;
+  std::vector<Vec3> arms_; ///< of joined vertices
   int groups_ = 0;
   std::vector<RodSet> islands_;  ///< per rod; empty where nothing joins any
   std::vector<char> joined_;     ///< per rod, as islands
@@ -116,6 +137,8 @@ private:
 
   PetscErrorCode createSection(PetscSection *section) const;
   void join(const Scene &scene, std::vector<int> free_slots);
+  void joinBodies(const Scene &scene, std::vector<int> &free_slots);
+  void tieEdges(const Scene &scene, JoinedEdge joined, std::vector<int> &free_slots);
   void makeIsland(RodSet a, RodSet b);
 };
 

@@ -48,10 +48,10 @@ public:
   std::vector<int> vertex0, vertex1; ///< ends of each edge
   std::vector<int> vertex_slot, edge_slot, cell_slot;
   std::vector<int> rod_cells; ///< offsets of the rods' cells (nr + 1)
-  int groups;                 ///< of junctions, each with a frame
+  int groups;                 ///< of junctions, then bodies, each with a frame
 
   // Over slots; zero where there is no such element, except rest lengths, which are one there.
-  const double *mass() const { return constants_[0]; }              ///< of vertices [kg]
+  const double *mass() const { return constants_[0]; }              ///< of vertices; on bodies it is theirs [kg]
   const double *restLength() const { return constants_[1]; }        ///< of edges [m]
   const double *inverseRestLength() const { return constants_[2]; } ///< [1/m]
   const double *axialStiffness() const { return constants_[3]; }    ///< [N]
@@ -74,6 +74,15 @@ public:
   std::span<const JoinedVertex> joinedVertices(RodSet set) const { return joined_vertices_.of(set); }
   std::span<const Tie> ties(RodSet set) const { return ties_.of(set); }
   const Frame &frameAsDrawn(const JoinedEdge &j) const { return joined_frame_[&j - joined_edges_.items.data()]; }
+  std::span<const JoinedBody> bodies(RodSet set) const { return bodies_.of(set); }
+  /// By the body's number in the scene.
+  const JoinedBody &body(int b) const { return bodies_.items[place_of_body_[b]]; }
+  int bodyCount() const { return int(body_mass_.size()); }
+  /// Of a body with what rods tied to it add, as drawn.
+  const MassProperties &bodyMass(int body) const { return body_mass_[body]; }
+  int bodyOf(const JoinedVertex &j) const { return body_of_[j.number]; }
+  /// From the centre of mass of its body to a vertex, as drawn [m].
+  const Vec3 &armAsDrawn(const JoinedVertex &j) const { return arm_[j.number]; }
   int vertices() const { return int(vertex_slot.size()); }
   int edges() const { return int(edge_slot.size()); }
 
@@ -86,6 +95,11 @@ private:
   ByRod<JoinedEdge> joined_edges_;
   ByRod<JoinedVertex> joined_vertices_;
   ByRod<Tie> ties_;
+  ByRod<JoinedBody> bodies_;
+  std::vector<MassProperties> body_mass_;
+  std::vector<int> place_of_body_, body_of_; ///< of each body in bodies_; of each joined vertex, its body or -1
+  std::vector<Vec3> arm_;                    ///< per joined vertex
+  void weighBodies(const Scene &scene);
   std::vector<Frame> joined_frame_;           ///< as drawn, of unit length
   std::vector<std::vector<int>> constraints_; ///< per rod
   std::vector<Pins> pins_;                    ///< per rod

@@ -75,8 +75,21 @@ private:
 struct JoinedVertex {
   int rod, vertex;
   int slot, first_slot; ///< its own, and that of the first member
-  int junction;         ///< of the scene
+  int junction;         ///< of the scene; -1 of a body
+  int attachment = -1;  ///< to a body, of the scene
+  /// Of a point of a body: a slot of its own for the body's frame, and that of the body's spin. `first_slot` is that of
+  /// its centre of mass, and the vertex moves by d + spin x arm, with the arm from there to it.
+  int frame = -1, first_frame = -1;
+  int number = -1; ///< over all joined vertices
   bool isCopy() const { return slot != first_slot; }
+  bool isOnBody() const { return frame >= 0; }
+};
+
+/// A rigid body beside a rod: the displacement of its centre of mass stands at one slot as a position, its spin at
+/// another.
+struct JoinedBody {
+  int rod, position, rotation;
+  int body, group; ///< of the scene; the number of its frame behind those of junctions
 };
 
 /// An edge beside a vertex in a group of a junction, tied to the frame of the group by a half cell. The frame that the
@@ -85,8 +98,9 @@ struct JoinedVertex {
 struct JoinedEdge {
   int rod, edge, vertex;
   int cell, frame, first_frame; ///< slots
-  int group;                    ///< over all junctions
-  bool ends;                    ///< at that vertex, or else begins there
+  int group;                    ///< over all junctions, then bodies
+  bool of_body;
+  bool ends; ///< at that vertex, or else begins there
   bool isFirst() const { return frame == first_frame; }
 };
 
@@ -102,6 +116,7 @@ struct Tie {
 struct Joins {
   std::span<const JoinedEdge> edges;
   std::span<const Tie> ties;
+  std::span<const JoinedBody> bodies;
 };
 
 /// Unknowns of a slot: x, y, z, twist.

@@ -11,7 +11,7 @@ template <class Visit> void forSameVertices(const Elements &elements, int rod, i
   const auto of_rod = elements.joinedVertices({rod, rod + 1});
   const auto own =
       std::find_if(of_rod.begin(), of_rod.end(), [&](const JoinedVertex &j) { return j.vertex == vertex; });
-  if (own == of_rod.end()) return visit(rod, vertex);
+  if (own == of_rod.end() || own->isOnBody()) return visit(rod, vertex);
   for (const JoinedVertex &j : elements.joinedVertices({0, int(elements.rods.size())}))
     if (j.junction == own->junction) visit(j.rod, j.vertex);
 }

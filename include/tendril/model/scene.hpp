@@ -3,6 +3,7 @@
 /// The scene: all that is fixed once set-up is done. Rods, what holds them, what pulls on them. Nothing here changes
 /// during a run.
 
+#include "tendril/model/body.hpp"
 #include "tendril/model/contact.hpp"
 #include "tendril/model/material.hpp"
 #include "tendril/model/strain.hpp"
@@ -131,7 +132,11 @@ struct Scene {
   std::vector<Support> supports;
   std::vector<Constraint> constraints;
   std::vector<Junction> junctions;
-  /// Whether junctions or ties join rods.
+  std::vector<Body> bodies;
+  std::vector<Attachment> attachments;
+  /// Gives every body its first rod, in the present order of rods.
+  void hostBodies();
+  /// Whether junctions, ties or bodies join rods.
   bool isJoined() const;
   std::vector<NodalForce> forces;
   std::vector<EdgeMoment> moments;
@@ -157,7 +162,7 @@ struct Scene {
   std::optional<Whole> whole;
   /// Whether anything dissipates by the rate of its strains: the stiffness of a rod, or a constraint.
   bool strainsDissipate() const;
-  bool hasCouples() const { return whole ? whole->has_couples : !moments.empty(); }
+  bool hasCouples() const;
   std::int64_t edges() const;
   bool collidersMove() const;
   /// The latest time up to another, later one until which all obstacles move evenly (Motion::evenUntil).

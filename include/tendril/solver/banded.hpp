@@ -38,8 +38,8 @@ struct BandedSystem {
 
 /// y += scale x metric x v for one rod, copies behind a ring included in v and in y. `edges`: as
 /// BandedSystem::edge_metric.
-void addMetric(const Planes &metric, const double *edges, const RodRange &rod, std::span<const JoinedEdge> joined,
-               double scale, const Planes &v, Planes &y);
+void addMetric(const Planes &metric, const double *edges, const RodRange &rod, const Joins &joins, double scale,
+               const Planes &v, Planes &y);
 
 class BandedFactor {
 public:

@@ -35,17 +35,23 @@ public:
   bool correct(Planes &solution) const;
 
 private:
-  /// One of the two columns of a couple: over x, y, z of the edge's vector, and its twist.
+  /// One of the two columns of a couple: over x, y, z of the edge's vector, and its twist; or over the spin of a body
+  /// at the slot.
   struct Column {
     int rod, slot;
     Vec3 edge;
     double twist;
+    bool of_body;
     double dot(const Planes &x) const;
     void addTo(Planes &x) const;
   };
   const IncrementalPotential &potential_;
   std::vector<RodSet> islands_;
-  std::vector<EdgeMoment> couples_; ///< by rod
+  /// On an edge, or where that is -1 what the spin of a body has beyond a symmetric matrix.
+  struct Couple : EdgeMoment {
+    const JoinedBody *body = nullptr;
+  };
+  std::vector<Couple> couples_; ///< by rod
   int countOn(RodSet island) const;
   std::vector<Column> columns_;  ///< two for each couple
   std::vector<double> strength_; ///< half of |M| for each couple [N m]

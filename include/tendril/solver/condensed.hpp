@@ -34,15 +34,18 @@ public:
   PetscErrorCode view(PetscViewer viewer) const;
 
 private:
-  using Places = std::array<int, state_size>; ///< among the separators' unknowns, or -1
+  /// Among the separators' unknowns, or -1; behind those of the state the spin of a body that has the vertex.
+  static constexpr int places_size = state_size + 3;
+  using Places = std::array<int, places_size>;
   /// Edges of a rod between two cuts.
   struct Run {
     int rod, begin, edges;
     bool from_separator, to_separator;
     bool from_through, to_through; ///< whether the rod runs on there, with its first edge and twist for unknowns
     Places near, far;
-    const JoinedEdge *near_frame = nullptr, *far_frame = nullptr; ///< to which its first and last edge are tied
-    std::vector<char> held;                                       ///< of its vertices
+    const JoinedEdge *near_frame = nullptr, *far_frame = nullptr;   ///< to which its first and last edge are tied
+    const JoinedVertex *near_point = nullptr, *far_point = nullptr; ///< of a body
+    std::vector<char> held;                                         ///< of its vertices
   };
   /// Runs factored together, as in BandedFactor.
   struct Group {
@@ -69,8 +72,12 @@ private:
   void group(std::vector<int> &rows, std::vector<int> &columns);
   template <class T> void factorGroup(const Group &group, const BandedSystem &system);
   template <class T> using Block = T[state_size][state_size];
+  Vec3 armOf(const JoinedVertex *point) const { return point ? dofs_.arm(*point) : Vec3(Vec3::Zero()); }
   template <class T>
   void addEntries(const Group &group, const Block<T> &near, const Block<T> &between, const Block<T> &far);
+  template <class T>
+  void addBodyEntries(const Run &run, const Block<T> &near, const Block<T> &between, const Block<T> &far, int lane,
+                      double *to);
   template <class T> void solveTo(const Group &group, const PetscScalar *b);
   template <class T> void solveFrom(const Group &group, PetscScalar *x);
   template <class T, class Visit> void eachValue(const Group &group, Visit visit);

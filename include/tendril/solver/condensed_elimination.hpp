@@ -15,6 +15,10 @@ void CondensedFactor::addEntries(const Group &group, const Block<T> &near, const
   for (int l = 0; l < group.count; ++l) {
     const Run &run = runs_[group.run[l]];
     double *to = entries_.data() + group.entry[l];
+    if (run.near_point || run.far_point) {
+      addBodyEntries(run, near, between, far, l, to);
+      continue;
+    }
     auto put = [&](const Places &row, const Places &column, auto value) {
       for (int r = 0; r < state_size; ++r)
         for (int c = 0; c < state_size; ++c)
@@ -30,6 +34,39 @@ void CondensedFactor::addEntries(const Group &group, const Block<T> &near, const
     put(run.far, run.near, [&](int r, int c) { return between[c][r]; });
     put(run.far, run.far, [&](int r, int c) { return far[std::min(r, c)][std::max(r, c)]; });
   }
+}
+
+/// What a run adds where its ends are points of bodies: x = d + spin x arm.
+template <class T>
+void CondensedFactor::addBodyEntries(const Run &run, const Block<T> &near, const Block<T> &between, const Block<T> &far,
+                                     int lane, double *to) {
+  using Wide = Eigen::Matrix<double, state_size, places_size>;
+  auto of = [&](const T &v) {
+    if constexpr (std::is_same_v<T, Pack>)
+      return double(v[lane]);
+    else
+      return v;
+  };
+  auto wide = [&](const JoinedVertex *point) {
+    Wide by = Wide::Zero();
+    by.template leftCols<state_size>().setIdentity();
+    by.template topRightCorner<3, 3>() = -crossMatrix<double>(armOf(point));
+    return by;
+  };
+  const Wide of_near = wide(run.near_point), of_far = wide(run.far_point);
+  auto put = [&](const Places &row, const Places &column, const Wide &left, const Wide &right, auto value) {
+    Eigen::Matrix<double, state_size, state_size> block;
+    for (int r = 0; r < state_size; ++r)
+      for (int c = 0; c < state_size; ++c) block(r, c) = value(r, c);
+    const Eigen::Matrix<double, places_size, places_size> all = left.transpose() * block * right;
+    for (int r = 0; r < places_size; ++r)
+      for (int c = 0; c < places_size; ++c)
+        if (row[r] >= 0 && column[c] >= 0) *to++ = all(r, c);
+  };
+  put(run.near, run.near, of_near, of_near, [&](int r, int c) { return of(near[std::min(r, c)][std::max(r, c)]); });
+  put(run.near, run.far, of_near, of_far, [&](int r, int c) { return of(between[r][c]); });
+  put(run.far, run.near, of_far, of_near, [&](int r, int c) { return of(between[c][r]); });
+  put(run.far, run.far, of_far, of_far, [&](int r, int c) { return of(far[std::min(r, c)][std::max(r, c)]); });
 }
 
 template <class T> void CondensedFactor::factorGroup(const Group &group, const BandedSystem &system) {

@@ -146,6 +146,26 @@ public:
   double addExcess(const Planes &increment, double scale, const Configuration &trial, int rod, Planes &force) const;
   /// Spins of the frames of junctions that follow the edges beside them: the mean of what an increment turns these by.
   void turnFrames(RodSet islands, Planes &increment) const;
+  /// Motions of the bodies of some islands, and of what follows them, into an increment: displacements and rotation
+  /// vectors from the iterate.
+  template <class Motion> void setBodies(RodSet islands, Planes &increment, Motion motion) const {
+    for (const JoinedBody &b : elements_.bodies(islands)) {
+      const BodyRate moved = motion(b);
+      increment.setVector(0, b.position, moved.translation);
+      increment.setVector(0, b.rotation, moved.spin);
+    }
+    if (!elements_.bodies(islands).empty()) dofs_.copyJoined(islands, increment);
+  }
+  /// Whether energies of two iterates can be compared: the work of couples, and of the spin of bodies, is counted from
+  /// the last one.
+  bool hasPotential() const { return !scene_.hasCouples() && scene_.bodies.empty(); }
+  bool isDynamic() const { return dynamic_; }
+  /// See Term::circulation.
+  Vec3 circulation(const JoinedBody &body) const {
+    Vec3 sum = Vec3::Zero();
+    for (const auto &term : terms_) sum += term->circulation(body, iterate_);
+    return sum;
+  }
   /// The same for all rods.
   bool tryMove(const Planes &increment, double scale, Configuration &trial);
   /// Makes the trial of one rod, or of all, the iterate.
@@ -166,8 +186,12 @@ public:
 
   /// \param energy that of the iterate
   Residual residual(int rod, const RodEnergy &energy) {
-    return residualOf(elements_, scene_.rods[rod].material, step_, axial_, iterate_, gradient(rod).equilibrium,
-                      scales_[rod], energy.reach, energy.steepness, rod);
+    Residual residual = residualOf(elements_, scene_.rods[rod].material, step_, axial_, iterate_,
+                                   gradient(rod).equilibrium, scales_[rod], energy.reach, energy.steepness, rod);
+    for (const JoinedBody &b : elements_.bodies({rod, rod + 1}))
+      includeBody(elements_, b, step_, start_, iterate_, gradient(rod).equilibrium, scales_[rod].force,
+                  bodyLoad(scene_, elements_, b.body), &residual);
+    return residual;
   }
   /// The largest of each over all rods.
   Residual residual();
@@ -196,6 +220,7 @@ public:
   /// State of some rods after the step: positions, directors made orthonormal, axial forces.
   void commitConfiguration(State &state, RodSet rods) const {
     tendril::commitConfiguration(elements_, iterate_, rods, state);
+    settleBodies(elements_, rods, state);
     for (const auto &term : terms_)
       for (int r = rods.begin; r < rods.end; ++r) term->commit(state, iterate_, r);
   }
@@ -225,11 +250,12 @@ private:
   Known &known(int rod) { return known_[dofs_.islandOf(rod).begin]; }
   std::vector<RodScale> scales_;
 
-  bool couples_positions_, joins_positions_;
+  bool dynamic_, couples_positions_, joins_positions_;
   bool obstacles_move_;
   std::vector<char> obstacles_held_; ///< per rod
 
   void assembleRod(int rod, HessianKind hessian);
+  void takeArms(int rod);
   void moveObstacles(int rod);
   double freeFraction(const Configuration &from, const Configuration &to, int rod) const;
   double reachOf(const Configuration &configuration, const RodRange &rod) const;

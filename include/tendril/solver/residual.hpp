@@ -12,7 +12,7 @@ struct RodScale {
   double length = 0, shortest_edge = 0, longest_edge = 0; ///< [m]
   double bending = 0;                                     ///< sum of the stiffnesses of its cells [N m]
   double pinning = 0, turning = 0;                        ///< sums of the stiffnesses of its constraints [N/m], [N m]
-  double load = 0;                                        ///< its loads [N], or 0
+  double load = 0;                                        ///< its loads, and its share of bodies' [N], or 0
   double force = 0;                                       ///< what measures its residual in the present step [N]
 };
 std::vector<RodScale> rodScales(const Scene &scene, const Elements &elements);
@@ -43,5 +43,12 @@ inline constexpr double Residual::*residual_parts[] = {&Residual::force,        
 Residual residualOf(const Elements &elements, const Material &material, const Step &step, const AxialLaw &axial,
                     const Configuration &iterate, const Planes &out_of_balance, const RodScale &scale, double reach,
                     double steepness, int rod);
+/// Of a body: forces by its loads or by those of its rod, couples by these times its size or arms.
+/// \param unit of the rod [N] \param load of the body [N]
+void includeBody(const Elements &elements, const JoinedBody &body, const Step &step, const Configuration &start,
+                 const Configuration &iterate, const Planes &out_of_balance, double unit, double load,
+                 Residual *residual);
+/// Weight of a body, with what pulls on it [N].
+double bodyLoad(const Scene &scene, const Elements &elements, int body);
 
 } // namespace tendril

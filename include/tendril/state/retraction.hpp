@@ -34,6 +34,8 @@ private:
   enum Work : int { softness, target, direction, diagonal = direction + 3, upper, right, corner, work_planes };
   Planes work_;
 
+  void turnArm(const Configuration &from, const Planes &increment, double scale, const JoinedVertex &j,
+               Configuration &to) const;
   void stiffenNearHeld(const RodRange &rod, const Elements::Pins &pins);
   bool aim(const Configuration &from, const RodRange &rod, RetractionKind kind, const Configuration &to);
   void lay(int begin, int end, Configuration &to) const;

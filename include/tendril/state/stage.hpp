@@ -8,12 +8,13 @@
 
 namespace tendril {
 
-/// Vertices and edges of rods that follow each other, [begin, end) in the order of the scene.
+/// Vertices and edges of rods that follow each other, [begin, end) in the order of the scene, and the bodies beside.
 struct Piece {
   int vertex, vertex_end, edge, edge_end;
+  std::span<const JoinedBody> bodies;
   Piece(const Elements &elements, RodSet rods)
       : vertex(elements.rods[rods.begin].first_vertex), vertex_end(vertex), edge(elements.rods[rods.begin].first_edge),
-        edge_end(edge) {
+        edge_end(edge), bodies(elements.bodies(rods)) {
     const RodRange &last = elements.rods[rods.end - 1];
     vertex_end = last.first_vertex + last.vertices;
     edge_end = last.first_edge + last.edges;
@@ -23,13 +24,15 @@ struct Piece {
 /// Sum of rates with weights.
 class Combination {
 public:
-  Combination &add(double weight, const std::vector<Vec3> &vertex, const std::vector<double> &edge) {
-    parts_.push_back({weight, &vertex, &edge});
+  Combination &add(double weight, const Rates &rates) {
+    parts_.push_back({weight, &rates.vertex, &rates.edge, &rates.body});
     return *this;
   }
-  Combination &add(double weight, const Rates &rates) { return add(weight, rates.vertex, rates.edge); }
   /// The velocities of a state.
-  Combination &add(double weight, const State &state) { return add(weight, state.velocity, state.twist_rate); }
+  Combination &add(double weight, const State &state) {
+    parts_.push_back({weight, &state.velocity, &state.twist_rate, &state.body_rate});
+    return *this;
+  }
   bool empty() const { return parts_.empty(); }
   Vec3 atVertex(int v) const {
     Vec3 sum = Vec3::Zero();
@@ -41,25 +44,36 @@ public:
     for (const Part &p : parts_) sum += p.weight * (*p.edge)[e];
     return sum;
   }
+  BodyRate ofBody(int b) const {
+    BodyRate sum;
+    for (const Part &p : parts_) sum.add(p.weight, (*p.body)[b]);
+    return sum;
+  }
   struct Part {
     double weight;
     const std::vector<Vec3> *vertex;
     const std::vector<double> *edge;
+    const std::vector<BodyRate> *body;
   };
   const std::vector<Part> &parts() const { return parts_; }
   /// Adds a multiple of it to what is there, or puts it there.
-  void addTo(double factor, const Piece &piece, std::vector<Vec3> &vertex, std::vector<double> &edge) const {
-    for (const Part &p : parts_) add(factor * p.weight, p, piece, vertex, edge, true);
+  void addTo(double factor, const Piece &piece, Rates &out) const {
+    for (const Part &p : parts_) add(factor * p.weight, p, piece, out.vertex, out.edge, out.body, true);
   }
-  void assignTo(const Piece &piece, std::vector<Vec3> &vertex, std::vector<double> &edge) const {
-    for (std::size_t k = 0; k < parts_.size(); ++k) add(parts_[k].weight, parts_[k], piece, vertex, edge, k > 0);
-  }
+  void assignTo(const Piece &piece, Rates &out) const { assignTo(piece, out.vertex, out.edge, out.body); }
+  void assignTo(const Piece &piece, State &out) const { assignTo(piece, out.velocity, out.twist_rate, out.body_rate); }
 
 private:
   std::vector<Part> parts_;
 
+  void assignTo(const Piece &piece, std::vector<Vec3> &vertex, std::vector<double> &edge,
+                std::vector<BodyRate> &body) const {
+    for (std::size_t k = 0; k < parts_.size(); ++k) add(parts_[k].weight, parts_[k], piece, vertex, edge, body, k > 0);
+  }
   static void add(double weight, const Part &part, const Piece &piece, std::vector<Vec3> &vertex,
-                  std::vector<double> &edge, bool to_what_is_there) {
+                  std::vector<double> &edge, std::vector<BodyRate> &body, bool to_what_is_there) {
+    for (const JoinedBody &b : piece.bodies)
+      body[b.body] = (to_what_is_there ? body[b.body] : BodyRate()).add(weight, (*part.body)[b.body]);
     for (int v = piece.vertex; v < piece.vertex_end; ++v)
       vertex[v] = to_what_is_there ? Vec3(vertex[v] + weight * (*part.vertex)[v]) : Vec3(weight * (*part.vertex)[v]);
     for (int e = piece.edge; e < piece.edge_end; ++e)
@@ -91,6 +105,7 @@ struct StageRule {
   bool wants_accelerations = true; ///< whether the method goes on with those of this stage
   const Rates *half = nullptr;     ///< displacements to the middle of the step: axial forces come from the mean of the
                                    ///< strains at both its ends (AxialLaw)
+  bool keeps_energy = false;       ///< spins and momenta of bodies are those that keep their energy (SpinStage)
 };
 
 /// Frames of a rod from which a stage measures twist: those of the start, carried to where the guess leads. Twist

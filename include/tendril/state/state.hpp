@@ -9,10 +9,24 @@
 
 namespace tendril {
 
+/// Displacement, velocity or acceleration of a body: of its centre of mass; its rotation vector, spin or the rate of
+/// that; and its angular momentum or the rate of that (none with a displacement). All in axes fixed in space.
+struct BodyRate {
+  Vec3 translation = Vec3::Zero(), spin = Vec3::Zero(), momentum = Vec3::Zero();
+  BodyRate &add(double weight, const BodyRate &other) {
+    translation += weight * other.translation;
+    spin += weight * other.spin;
+    momentum += weight * other.momentum;
+    return *this;
+  }
+  bool operator==(const BodyRate &) const = default;
+};
+
 /// Displacements, velocities or accelerations of all unknowns.
 struct Rates {
-  std::vector<Vec3> vertex; ///< (nv)
-  std::vector<double> edge; ///< (ne) of the twist
+  std::vector<Vec3> vertex;   ///< (nv)
+  std::vector<double> edge;   ///< (ne) of the twist
+  std::vector<BodyRate> body; ///< (nb)
   bool operator==(const Rates &) const = default;
 };
 
@@ -36,8 +50,10 @@ struct State {
   std::vector<Vec3> velocity;      ///< (nv) [m/s]
   std::vector<double> twist_rate;  ///< (ne) [rad/s]
   std::vector<double> axial_force; ///< (ne) [N]
-  /// Rotation of the frame of each group of junctions since it was drawn: its first two columns.
+  /// Rotation of the frame of each group of junctions, then of each body, since it was drawn: its first two columns.
   std::vector<std::array<Vec3, 2>> junction_axes;
+  std::vector<Vec3> body_position, body_position_low; ///< (nb) of the centres of mass, in two words [m]
+  std::vector<BodyRate> body_rate;                    ///< (nb) velocities, spins and angular momenta
   std::vector<double>
       winding;        ///< (cells) 2 pi x whole turns of the twist angle, carried by continuity (`angle` measure) [rad]
   double last_dt = 0; ///< length of the step that led here; 0 where the integrator remembers nothing [s]
@@ -65,7 +81,7 @@ class Configuration {
 public:
   /// First planes of what is stored.
   enum Plane : int {
-    position = 0, ///< at the slot of a junction's frame: its spin since the step began, summed [rad]
+    position = 0, ///< at the slot of a frame of a junction or body: its spin since the step began, summed [rad]
     tangent = 3,
     director = 6,
     length = 9,
@@ -90,6 +106,13 @@ public:
   const Planes &values() const { return values_; }
   Vec3 positionAt(int slot) const { return values_.vector(position, slot); }
   Frame frameAt(int slot) const { return frames<double>(slot); }
+  /// Of a body, since it was drawn.
+  Mat3 rotationAt(int slot) const {
+    const Frame f = frameAt(slot);
+    Mat3 m;
+    m << f.tangent, f.director, f.secondDirector();
+    return m;
+  }
   void setFrame(int slot, const Frame &f);
   /// Frames of a slot or of a pack of them.
   template <class T> FrameOf<T> frames(int slot) const {
@@ -139,6 +162,8 @@ Configuration configurationOf(const State &state, const Scene &scene, const Elem
 void setSupports(const Scene &scene, const Elements &elements, double motion_time, Configuration &c);
 void setRod(const State &state, const Elements &elements, int rod, Configuration &c);
 
+/// How a group of junctions, or a body, has turned since it was drawn.
+Mat3 rotationOf(const State &state, int group);
 /// Frame to which a half cell ties an edge, as its junction has turned.
 Frame joinedFrame(const State &state, const Elements &elements, const JoinedEdge &edge);
 

@@ -51,6 +51,8 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
         back[3][rod.slot(i)] = -moment * state.twist_rate[rod.first_edge + i];
       potential.dofs().copyBehindRing(rod, back);
     }
+    potential.setBodies(potential.all(), back,
+                        [&](const JoinedBody &b) { return BodyRate().add(-moment, state.body_rate[b.body]); });
     potential.turnFrames(potential.all(), back);
     Configuration earlier;
     bool possible = true;
@@ -64,7 +66,8 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
       solver.begin(state, step);
     }
   }
-  Rates a{std::vector<Vec3>(state.velocity.size(), Vec3::Zero()), std::vector<double>(state.twist_rate.size(), 0.0)};
+  Rates a{std::vector<Vec3>(state.velocity.size(), Vec3::Zero()), std::vector<double>(state.twist_rate.size(), 0.0),
+          std::vector<BodyRate>(state.body_rate.size())};
   for (int r = 0; r < int(elements.rods.size()); ++r) {
     const RodRange &rod = elements.rods[r];
     const Planes &force = potential.gradient(r).equilibrium;
@@ -82,7 +85,7 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
   }
   std::map<int, double> mass; // of junctions, by the slots of their first members, which have all forces
   const auto joined = elements.joinedVertices(potential.all());
-  for (const JoinedVertex &j : joined) mass[j.first_slot] += elements.mass()[j.slot];
+  for (const JoinedVertex &j : joined) mass[j.first_slot] += j.isOnBody() ? 0 : elements.mass()[j.slot];
   for (const JoinedVertex &j : joined) {
     const double whole = elements.freedom()[j.slot] * mass[j.first_slot],
                  damping = potential.scene().rods[j.rod].material.mass_damping_coefficient;
@@ -90,6 +93,24 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
     if (whole > 0)
       a.vertex[v] =
           -potential.gradient(j.rod).equilibrium.vector(0, j.first_slot) / whole - damping * state.velocity[v];
+  }
+  for (const JoinedBody &b : elements.bodies(potential.all())) {
+    const Planes &force = potential.gradient(b.rod).equilibrium;
+    const MassProperties &all = elements.bodyMass(b.body);
+    const Mat3 turned = rotationOf(state, b.group);
+    const BodyRate &rate = state.body_rate[b.body];
+    BodyRate &of_body = a.body[b.body];
+    of_body.translation = -force.vector(0, b.position) / all.mass;
+    of_body.momentum = -force.vector(0, b.rotation);
+    of_body.spin =
+        turned * all.inertia.ldlt().solve(turned.transpose() * (of_body.momentum - rate.spin.cross(rate.momentum)));
+  }
+  for (const JoinedVertex &j : joined) {
+    if (!j.isOnBody()) continue;
+    const int body = elements.bodyOf(j);
+    const Vec3 arm = potential.dofs().arm(j), &spin = state.body_rate[body].spin;
+    a.vertex[elements.rods[j.rod].first_vertex + j.vertex] =
+        a.body[body].translation + a.body[body].spin.cross(arm) + spin.cross(spin.cross(arm));
   }
   return a;
 }
@@ -120,6 +141,9 @@ std::vector<double> strainsBehind(StepSolver &solver, const State &start, const 
       }
       potential.dofs().copyBehindRing(rod, moved);
     }
+    potential.setBodies(potential.all(), moved, [&](const JoinedBody &b) {
+      return BodyRate().add(along, rule.guess.ofBody(b.body)).add(later, rule.velocity.ofBody(b.body));
+    });
     potential.remainingMotion(potential.all(), moved);
     potential.turnFrames(potential.all(), moved);
     for (int r = 0; r < potential.all().end; ++r)

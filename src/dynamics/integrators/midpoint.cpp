@@ -31,6 +31,7 @@ public:
   StageRule stage(const State &start, double h, const Stages &done) const override {
     StageRule rule;
     rule.fraction = 0.5;
+    rule.keeps_energy = most_ > 1;
     rule.dt = rule.damping_dt = 0.5 * h;
     rule.acceleration.add(-1, start);
     if (done.empty())

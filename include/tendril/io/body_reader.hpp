@@ -1,0 +1,16 @@
+#pragma once
+/// \file body_reader.hpp
+/// Rigid bodies, and what ties rods to them, from a scene file. \throws SceneError
+
+#include "tendril/io/scene_reader.hpp"
+#include "tendril/io/yaml.hpp"
+
+namespace tendril {
+
+/// Adds what a block of `bodies` says to the scene.
+void readBody(const YamlValue &value, SceneFile &out);
+/// Adds the exact ties that a block of `constraints` says: it has a `body`, or is of `type: weld`. Bodies and supports
+/// are there. \param name of the block
+void readAttachments(YamlMap &map, const std::string &name, SceneFile &out);
+
+} // namespace tendril
