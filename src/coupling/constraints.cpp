@@ -76,7 +76,7 @@ private:
   Vec3 movedSinceRest(const Configuration &c) const { return length_ * (strainOf(c) - rest_).col(0); }
 };
 
-/// A pin whose point is another vertex.
+/// A pin whose point is another vertex, or a point of a body.
 class PinToVertex : public Pin {
 public:
   static constexpr SiteKind site = SiteKind::tie;
@@ -104,13 +104,7 @@ public:
   double noise(const Configuration &c, double blur) const { return noiseOf(deviationOf(c), 4 * blur); }
   void derivatives(const Configuration &c, HessianKind kind, Local<edge_size> &out) const {
     const bool exact = kind != HessianKind::gauss_newton;
-    VectorDerivatives by_spin = rotationDerivatives(constraint_, deviationOf(c), !exact);
-    if (weight_ > 0) {
-      const VectorDerivatives damper = damperAt(c);
-      by_spin.gradient += damper.gradient;
-      by_spin.hessian += exact ? damper.hessian : Mat3(weight_ * Mat3::Identity());
-    }
-    const EdgeDerivatives d = overEdge(c.frameAt(slot), by_spin, exact);
+    const EdgeDerivatives d = overEdge(c.frameAt(slot), bySpin(c, exact), exact);
     out.gradient = d.gradient;
     out.hessian = d.hessian;
   }
@@ -118,6 +112,17 @@ public:
     Vec3 moment = -rotationDerivatives(constraint_, deviationOf(c)).gradient;
     if (weight_ > 0 && constraint_.damps_motion) moment -= damperAt(c).gradient;
     return {Vec3::Zero(), moment};
+  }
+
+protected:
+  /// By a spin of the edge.
+  VectorDerivatives bySpin(const Configuration &c, bool exact) const {
+    VectorDerivatives by_spin = rotationDerivatives(constraint_, deviationOf(c), !exact);
+    if (weight_ == 0) return by_spin;
+    const VectorDerivatives damper = damperAt(c);
+    by_spin.gradient += damper.gradient;
+    by_spin.hessian += exact ? damper.hessian : Mat3(weight_ * Mat3::Identity());
+    return by_spin;
   }
 
 private:
@@ -130,12 +135,41 @@ private:
   }
 };
 
+/// A rotation whose frame is that of a body. Turning both alike costs nothing: with m and H the derivatives by the spin
+/// a of the edge, those by the spin b of the body are -m and H, and between them a'(-H - [m]x/2) b, the last of the
+/// commutator of both.
+class RotationToBody : public Rotation {
+public:
+  static constexpr SiteKind site = SiteKind::edge_to_frame;
+  int cell; ///< slot of what edge and frame have between them
+
+  RotationToBody(const Scene &scene, const Elements &elements, int k) : Rotation(scene, elements, k) {
+    for (const JoinedEdge &j : elements.joinedEdges({rod, rod + 1}))
+      if (j.frame == target) cell = j.cell;
+  }
+  void derivatives(const Configuration &c, HessianKind kind, Local<edge_size + 3> &out) const {
+    const bool exact = kind != HessianKind::gauss_newton;
+    const Frame f = c.frameAt(slot);
+    const VectorDerivatives by_spin = bySpin(c, exact);
+    const EdgeDerivatives d = overEdge(f, by_spin, exact);
+    Eigen::Matrix<double, 3, 4> spin; // of the edge, by its vector and twist
+    spin << crossMatrix<double>(f.tangent) / f.length, f.tangent;
+    Mat3 between = -by_spin.hessian;
+    if (exact) between += 0.5 * crossMatrix<double>(by_spin.gradient);
+    out.gradient << d.gradient, -by_spin.gradient;
+    out.hessian.topLeftCorner<4, 4>() = d.hessian;
+    out.hessian.bottomRightCorner<3, 3>() = by_spin.hessian;
+    out.hessian.bottomLeftCorner<3, 4>() = between * spin;
+    out.hessian.topRightCorner<4, 3>() = out.hessian.bottomLeftCorner<3, 4>().transpose();
+  }
+};
+
 template <class Stencil>
 std::unique_ptr<Term> makeConstraints(const Scene &scene, const Elements &elements, Constraint::Kind kind,
-                                      bool ties = false) {
+                                      bool to_world = true) {
   std::vector<Stencil> stencils;
   for (std::size_t k = 0; k < scene.constraints.size(); ++k)
-    if (scene.constraints[k].kind == kind && scene.constraints[k].isTie() == ties)
+    if (scene.constraints[k].kind == kind && scene.constraints[k].isToWorld() == to_world)
       stencils.emplace_back(scene, elements, int(k));
   if (stencils.empty()) return nullptr;
   return std::make_unique<StencilTerm<Stencil, &EnergyBudget::constraint>>(std::move(stencils), elements);
@@ -147,7 +181,10 @@ std::unique_ptr<Term> makePins(const Scene &scene, const Elements &elements) {
   return makeConstraints<Pin>(scene, elements, Constraint::Kind::pin);
 }
 std::unique_ptr<Term> makeTies(const Scene &scene, const Elements &elements) {
-  return makeConstraints<PinToVertex>(scene, elements, Constraint::Kind::pin, true);
+  return makeConstraints<PinToVertex>(scene, elements, Constraint::Kind::pin, false);
+}
+std::unique_ptr<Term> makeRotationsToBodies(const Scene &scene, const Elements &elements) {
+  return makeConstraints<RotationToBody>(scene, elements, Constraint::Kind::rotation, false);
 }
 std::unique_ptr<Term> makeRotations(const Scene &scene, const Elements &elements) {
   return makeConstraints<Rotation>(scene, elements, Constraint::Kind::rotation);

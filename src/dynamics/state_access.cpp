@@ -2,6 +2,7 @@
 
 #include "tendril/energy/edge.hpp"
 #include "tendril/layout/same_vertices.hpp"
+#include "tendril/state/commit.hpp"
 
 #include <algorithm>
 #include <sstream>
@@ -82,6 +83,13 @@ bool RodAccess::holds(int vertex, bool (Support::*what)() const) const {
                      [&](const Support *s) { return s->vertex == vertex && (s->*what)(); });
 }
 
+/// Whether a vertex goes with a body.
+bool RodAccess::isOnBody(int vertex) const {
+  const auto joined = elements_.joinedVertices({index_, index_ + 1});
+  return std::any_of(joined.begin(), joined.end(),
+                     [=](const JoinedVertex &j) { return j.vertex == vertex && j.isOnBody(); });
+}
+
 Frame RodAccess::edgeFrame(const State &state, int i) const {
   const int v = range_.first_vertex + i, w = range_.first_vertex + rod().next(i);
   const Vec3 edge = (state.position[w] - state.position[v]) + (state.position_low[w] - state.position_low[v]);
@@ -145,6 +153,7 @@ void RodAccess::setTurns(State &next, std::vector<double> twists, const std::vec
 }
 
 void RodAccess::accept(State &&next) {
+  settleBodies(elements_, {0, int(elements_.rods.size())}, next);
   next.memory.clear();
   next.strains.clear();
   next.support_actions.clear();
@@ -174,8 +183,10 @@ void RodAccess::setPositions(const std::vector<Vec3> &x) {
     }
     for (const JoinedVertex &j : elements_.joinedVertices({index_, index_ + 1}))
       if (j.vertex == i)
-        fail(text("vertex ", i, " is in junction '", scene_.junctions[j.junction].name,
-                  "', and cannot be put elsewhere by one of its rods"));
+        fail(text("vertex ", i,
+                  j.isOnBody() ? " is tied to body '" + scene_.bodies[j.body].name + "', and cannot be put elsewhere"
+                               : " is in junction '" + scene_.junctions[j.junction].name +
+                                     "', and cannot be put elsewhere by one of its rods"));
     next.position[v] = x[i];
     next.position_low[v].setZero();
   }
@@ -256,7 +267,7 @@ void RodAccess::setVelocities(const std::vector<Vec3> &v) {
   if (v == velocities()) return;
   State next = state_;
   for (int i = 0; i < range_.vertices; ++i)
-    if (elements_.freedom()[range_.slot(i)] != 0)
+    if (elements_.freedom()[range_.slot(i)] != 0 && !isOnBody(i))
       forSameVertices(elements_, index_, i,
                       [&](int rod, int vertex) { next.velocity[elements_.rods[rod].first_vertex + vertex] = v[i]; });
   accept(std::move(next));

@@ -92,9 +92,14 @@ ConstraintReading readConstraint(const Scene &scene, const Elements &elements, i
   const Motion still, &motion = constraint.damps_motion ? constraint.motion : still;
   ConstraintReading out;
   if (constraint.isPin()) {
-    const Vec3 target_velocity =
-        constraint.isTie() ? state.velocity[elements.rods[constraint.to_rod].first_vertex + constraint.to_vertex]
-                           : motion.velocityAt(state.time);
+    Vec3 target_velocity = motion.velocityAt(state.time);
+    if (constraint.isTie())
+      target_velocity = state.velocity[elements.rods[constraint.to_rod].first_vertex + constraint.to_vertex];
+    if (constraint.isToBody()) {
+      const BodyRate &rate = state.body_rate[constraint.to_body];
+      const Vec3 arm = c.positionAt(elements.constraint_slot[index]) - state.body_position[constraint.to_body];
+      target_velocity = rate.translation + rate.spin.cross(arm);
+    }
     out.distance = g;
     out.force = -distanceDerivatives(constraint, g).gradient -
                 damping * (state.velocity[rod.first_vertex + constraint.at] - target_velocity);
@@ -106,7 +111,9 @@ ConstraintReading readConstraint(const Scene &scene, const Elements &elements, i
       f.tangent.cross(state.velocity[elements.vertex1[e]] - state.velocity[elements.vertex0[e]]) / f.length +
       f.tangent * state.twist_rate[e];
   out.rotation = g;
-  out.moment = -rotationDerivatives(constraint, g).gradient - damping * (spin - motion.angularVelocityAt(state.time));
+  const Vec3 target_spin =
+      constraint.isToBody() ? state.body_rate[constraint.to_body].spin : motion.angularVelocityAt(state.time);
+  out.moment = -rotationDerivatives(constraint, g).gradient - damping * (spin - target_spin);
   return out;
 }
 

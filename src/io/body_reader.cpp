@@ -12,6 +12,8 @@
 namespace tendril {
 namespace {
 
+constexpr MotionKeys motion_keys{"bodies[].motion", "bodies[].motion.velocity", "bodies[].motion.angular_velocity",
+                                 "bodies[].motion.table"};
 constexpr const char *shape_names = "box, sphere, capsule, cylinder or mesh";
 
 /// A closed surface.
@@ -149,7 +151,7 @@ void refuseForAttachment(YamlMap &map, bool weld) {
     map.at("constraints[].to").fail("'to' and 'body' name two other ends of one tie; take one of them away");
   if (map.has("constraints[].stiffness"))
     map.at("constraints[].stiffness")
-        .fail("penalties to bodies are not there yet; leave 'stiffness' away: the tie is exact");
+        .fail("a weld is exact; leave 'stiffness' away, or write springs of 'type: pin' and 'type: rotation'");
   for (const AnyKey key :
        {AnyKey("constraints[].motion"), AnyKey("constraints[].point"), AnyKey("constraints[].closest"),
         AnyKey("constraints[].edge"), AnyKey("constraints[].measure"), AnyKey("constraints[].saturation"),
@@ -162,20 +164,22 @@ void refuseForAttachment(YamlMap &map, bool weld) {
       map.at(key).fail("'" + std::string(key->name()) + "' is for 'type: weld'; a pin lets the rod turn");
 }
 
-/// Number of the body that a tie speaks of.
-int findBody(const YamlValue &value, const SceneFile &file) {
+} // namespace
+
+SceneFile::BodyPlace findBody(const YamlValue &value, const SceneFile &file) {
   const std::string word = value.text();
-  const std::vector<Body> &bodies = file.scene.bodies;
-  if (const auto named = file.body_numbers.find(word); named != file.body_numbers.end()) return named->second;
+  const std::vector<SceneFile::BodyPlace> &bodies = file.bodies;
+  if (const auto named = file.body_numbers.find(word); named != file.body_numbers.end())
+    return bodies[std::size_t(named->second)];
   const bool number = !word.empty() && word.size() < 10 && word.find_first_not_of("0123456789") == std::string::npos &&
                       (word == "0" || word[0] != '0');
-  if (number && std::stoi(word) < int(bodies.size())) return std::stoi(word);
+  if (number && std::stoi(word) < int(bodies.size())) return bodies[std::size_t(std::stoi(word))];
   const std::string none = "there is no body '" + inOneLine(word) + "'";
   if (bodies.empty()) value.fail(none + ": the scene has no 'bodies'; describe it there");
   constexpr std::size_t most = 5;
   std::vector<std::string> names;
   std::string some;
-  for (const Body &body : bodies) names.push_back(body.name);
+  for (const SceneFile::BodyPlace body : bodies) names.push_back(file.bodyAt(body).name);
   for (std::size_t b = 0; b < std::min(most, names.size()); ++b) some += (b > 0 ? ", '" : "'") + names[b] + "'";
   if (names.size() > most) some += " and " + std::to_string(names.size() - most) + " more";
   const std::string near = closest(word, names);
@@ -183,16 +187,18 @@ int findBody(const YamlValue &value, const SceneFile &file) {
              std::to_string(names.size() - 1) + (near.empty() ? "" : "; did you mean '" + near + "'?"));
 }
 
+namespace {
+
 /// Refuses a vertex that something else holds, and a rod that cannot be tied so.
-void check(const YamlValue &value, const Attachment &a, const SceneFile &file) {
+void check(const YamlValue &value, const Attachment &a, SceneFile::BodyPlace place, const SceneFile &file) {
   const Scene &scene = file.scene;
   const Rod &rod = scene.rods[a.rod];
-  const Body &body = scene.bodies[a.body];
+  const Body &body = file.bodyAt(place);
   const std::string vertex = "vertex " + std::to_string(a.vertex) + " of rod '" + rod.name + "'",
                     tie = "constraint '" + a.name + "' ties it to body '" + body.name + "'";
   if (a.weld && rod.material.isCable())
     value.fail("rod '" + rod.name + "' has no flexural stiffness that a weld could hold; write 'type: pin'");
-  if (rod.gravity != body.gravity)
+  if (!place.held && rod.gravity != body.gravity)
     value.fail("gravity acts on " + (rod.gravity ? "rod '" + rod.name + "'" : "body '" + body.name + "'") +
                ", and not on " + (rod.gravity ? "body '" + body.name + "'" : "rod '" + rod.name + "'") +
                "; the mass of the half edge at the tied vertex belongs to the body: give both the same 'gravity'");
@@ -268,9 +274,23 @@ void readBody(const YamlValue &value, SceneFile &out) {
   body.gravity = map.flag("bodies[].gravity");
   body.force = map.vector("bodies[].force");
   body.torque = map.vector("bodies[].torque");
+  const bool held = map.flag("bodies[].fixed") || map.has("bodies[].motion");
+  if (map.has("bodies[].motion")) {
+    const YamlValue motion = map.at("bodies[].motion");
+    if (map.flag("bodies[].fixed")) motion.fail("'fixed' and 'motion' contradict each other; take one of them away");
+    body.motion = readMotion(motion, motion_keys);
+  }
+  for (const AnyKey key : {AnyKey("bodies[].velocity"), AnyKey("bodies[].angular_velocity"), AnyKey("bodies[].force"),
+                           AnyKey("bodies[].torque")})
+    if (held && map.has(key))
+      map.at(key).fail("'" + std::string(key->name()) +
+                       "' has no meaning for a body that is 'fixed' or goes by its "
+                       "'motion'; take it away");
   map.finish();
-  out.body_numbers[body.name] = int(out.scene.bodies.size());
-  out.scene.bodies.push_back(std::move(body));
+  std::vector<Body> &among = held ? out.scene.held_bodies : out.scene.bodies;
+  out.body_numbers[body.name] = int(out.bodies.size());
+  out.bodies.push_back({held, int(among.size())});
+  among.push_back(std::move(body));
 }
 
 void readAttachments(YamlMap &map, const std::string &name, SceneFile &out) {
@@ -282,9 +302,10 @@ void readAttachments(YamlMap &map, const std::string &name, SceneFile &out) {
     value.fail("a weld ties a vertex to a 'body', which is missing; to hold it in the world write a support of 'type: "
                "clamp', to join rods a junction of 'type: rigid'");
   if (type == "rotation")
-    map.at("constraints[].body").fail("no spring turns an edge to a body yet; write 'type: weld' at a 'vertex'");
+    value.fail("'stiffness' is missing: a rotation is a spring; to hold the angle exactly write 'type: weld' at a "
+               "'vertex'");
   refuseForAttachment(map, weld);
-  const int body = findBody(map.at("constraints[].body"), out);
+  const SceneFile::BodyPlace body = findBody(map.at("constraints[].body"), out);
   const std::vector<int> rods = readTargets(map, "constraints[].rod", out.names);
   for (std::size_t k = 0; k < rods.size(); ++k) {
     const Rod &rod = out.scene.rods[rods[k]];
@@ -294,14 +315,23 @@ void readAttachments(YamlMap &map, const std::string &name, SceneFile &out) {
       value.fail("a constraint with the name '" + a.name + "' is there already");
     a.rod = rods[k];
     a.vertex = readIndex(map, "constraints[].vertex", rod.vertices(), rod.name);
-    a.body = body;
+    a.body = body.index;
     a.weld = weld;
-    check(value, a, out);
+    check(value, a, body, out);
     a.frame = weld ? readFrame(map, rod, a.vertex) : frameAtVertex(rod, a.vertex);
     a.tangent_given = map.has("constraints[].tangent");
     a.director_given = map.has("constraints[].director");
     out.attached[{a.rod, a.vertex}] = a.name;
-    out.scene.attachments.push_back(std::move(a));
+    if (!body.held) {
+      out.scene.attachments.push_back(std::move(a));
+      continue;
+    }
+    // A body that goes its own way holds what is tied to it as a support does.
+    const Body &holder = out.bodyAt(body);
+    out.supports_at[{a.rod, a.vertex}].push_back(int(out.scene.supports.size()));
+    out.scene.supports.push_back({weld ? Support::Kind::clamp : Support::Kind::pin, a.rod, a.vertex,
+                                  holder.motion.at(rod.position[a.vertex] - holder.position), a.frame, a.tangent_given,
+                                  a.director_given});
   }
   map.finish();
 }

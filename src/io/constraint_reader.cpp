@@ -132,7 +132,14 @@ void readConstraint(const YamlValue &value, SceneFile &out) {
   const std::string name = map.has("constraints[].name") ? readName(map.at("constraints[].name"))
                                                          : "constraint" + std::to_string(out.constraint_blocks);
   ++out.constraint_blocks;
-  if (type == "weld" || map.has("constraints[].body")) return readAttachments(map, name, out);
+  const bool to_body = map.has("constraints[].body");
+  if (type == "weld" || (to_body && !map.has("constraints[].stiffness"))) return readAttachments(map, name, out);
+  for (const AnyKey key :
+       {AnyKey("constraints[].to"), AnyKey("constraints[].motion"), AnyKey("constraints[].update_old_target")})
+    if (to_body && map.has(key))
+      map.at(key).fail("'" + std::string(key->name()) +
+                       "' is for a constraint without a 'body', whose point and frame "
+                       "are those of the body");
   const YamlValue to = map.at("constraints[].to");
   if (to.isMap())
     refuseForTie(map, type);
@@ -173,13 +180,22 @@ void readConstraint(const YamlValue &value, SceneFile &out) {
         refuseTravel(motion, c.motion, "a rotation moves nothing; take the displacement away, or add a pin that moves");
     }
     c.isPin() ? readPin(map, rod, out, c) : readRotation(map, rod, c);
+    if (to_body) {
+      const SceneFile::BodyPlace place = findBody(map.at("constraints[].body"), out);
+      const Body &body = out.bodyAt(place);
+      if (place.held)
+        c.motion = body.motion.at(c.isPin() ? Vec3(c.point - body.position) : Vec3(Vec3::Zero()));
+      else
+        c.to_body = place.index;
+    }
     const double length = rod.length();
     const double own = c.isPin() ? rod.material.axial_stiffness / length : stiffestTurning(rod.material) / length;
     if (c.stiffness > 1e6 * own && !told) {
       out.notes.push_back("warning: " + map.at("constraints[].stiffness").place() + ": 'stiffness' is " +
                           shortText(c.stiffness / own) + " times that of rod '" + rod.name +
                           "', which costs digits; a " +
-                          (c.isTie()   ? "junction of 'type: ball"
+                          (to_body     ? "constraint without 'stiffness', of 'type: weld"
+                           : c.isTie() ? "junction of 'type: ball"
                            : c.isPin() ? "support of 'type: pin"
                                        : "support of 'type: clamp") +
                           "' is exact");

@@ -130,12 +130,12 @@ std::string rulesOf(std::string_view block) {
     return R"("if": {"properties": {"type": {"const": "pin"}}},
  "then": {"not": {"anyOf": [{"required": ["tangent"]}, {"required": ["director"]}]}})";
   if (block == "constraints[]")
-    return R"("if": {"anyOf": [{"required": ["body"]}, {"properties": {"type": {"const": "weld"}}}]},
+    return R"("if": {"anyOf": [{"required": ["body"], "not": {"required": ["stiffness"]}}, {"properties": {"type": {"const": "weld"}}}]},
  "then": {"required": ["body", "vertex"], "properties": {"type": {"enum": ["pin", "weld"]}},
   "not": {"anyOf": [{"required": ["to"]}, {"required": ["stiffness"]}, {"required": ["motion"]}, {"required": ["point"]}, {"required": ["closest"]},
    {"required": ["edge"]}, {"required": ["measure"]}, {"required": ["saturation"]}, {"required": ["damping"]}, {"required": ["update_old_target"]}]},
   "if": {"properties": {"type": {"const": "pin"}}}, "then": {"not": {"anyOf": [{"required": ["tangent"]}, {"required": ["director"]}]}}},
- "else": {"required": ["stiffness"],
+ "else": {"required": ["stiffness"], "dependencies": {"body": {"not": {"anyOf": [{"required": ["to"]}, {"required": ["motion"]}, {"required": ["update_old_target"]}]}}},
  "if": {"properties": {"type": {"const": "pin"}}},
  "then": {"oneOf": [{"required": ["vertex"], "properties": {"closest": {"const": false}}}, {"required": ["closest", "point"], "properties": {"closest": {"const": true}}}],
   "not": {"anyOf": [{"required": ["edge"]}, {"required": ["tangent"]}, {"required": ["director"]}, {"required": ["measure"]}]}},
@@ -146,8 +146,11 @@ std::string rulesOf(std::string_view block) {
   "allOf": [{"oneOf": [{"required": ["density"]}, {"required": ["mass"]}]}]},
  {"required": ["mass", "inertia"], "not": {"anyOf": [{"required": ["density"]}, {"required": ["box"]}, {"required": ["sphere"]}, {"required": ["capsule"]},
   {"required": ["cylinder"]}, {"required": ["mesh"]}]}}],
- "dependencies": {"centre": ["inertia"]})";
-  if (block == "supports[].motion" || block == "constraints[].motion" || block == "colliders[].motion")
+ "dependencies": {"centre": ["inertia"]},
+ "if": {"anyOf": [{"required": ["motion"]}, {"required": ["fixed"], "properties": {"fixed": {"const": true}}}]},
+ "then": {"not": {"anyOf": [{"required": ["velocity"]}, {"required": ["angular_velocity"]}, {"required": ["force"]}, {"required": ["torque"]},
+  {"required": ["fixed", "motion"], "properties": {"fixed": {"const": true}}}]}})";
+  if (block == "supports[].motion" || block == "constraints[].motion" || block == "colliders[].motion" || block == "bodies[].motion")
     return R"("oneOf": [{"required": ["table"]}, {"anyOf": [{"required": ["velocity"]}, {"required": ["angular_velocity"]}]}])";
   if (block == "contact")
     return R"("if": {"required": ["radius"], "properties": {"radius": {"const": 0}}},

@@ -23,15 +23,26 @@ void requireHeld(const Scene &scene) {
   for (const Junction &j : scene.junctions)
     for (const Junction::Member &m : j.members) first[rootOf(m.rod)] = rootOf(j.members.front().rod);
   for (const Constraint &c : scene.constraints)
-    if (c.isTie() && c.stiffness > 0) first[rootOf(c.rod)] = rootOf(c.to_rod);
+    if (c.isPin() && !c.isToWorld() && c.stiffness > 0)
+      first[rootOf(c.rod)] = rootOf(c.isTie() ? c.to_rod : scene.bodies[c.to_body].rod);
   for (const Attachment &a : scene.attachments) first[rootOf(a.rod)] = rootOf(scene.bodies[a.body].rod);
   std::vector<char> held(scene.rods.size(), false);
   for (const Support &s : scene.supports)
     if (s.holdsPosition()) held[rootOf(s.rod)] = true;
   for (const Constraint &c : scene.constraints)
-    if (c.isPin() && !c.isTie() && c.stiffness > 0) held[rootOf(c.rod)] = true;
+    if (c.isPin() && c.isToWorld() && c.stiffness > 0) held[rootOf(c.rod)] = true;
   for (int r = 0; r < int(scene.rods.size()); ++r)
     if (scene.touches(r)) held[rootOf(r)] = true; // what obstacles hold shows
+  std::vector<char> tied(scene.bodies.size(), false);
+  for (const Attachment &a : scene.attachments) tied[a.body] = true;
+  for (const Constraint &c : scene.constraints)
+    if (c.isToBody() && c.isPin() && c.stiffness > 0) tied[c.to_body] = true;
+  for (std::size_t b = 0; b < tied.size(); ++b)
+    if (!tied[b])
+      throw SceneError(
+          "body '" + scene.bodies[b].name +
+          "' is free to move: -mode static needs a weld or pin, exact or with a stiffness, that ties it to "
+          "a rod, or write 'fixed: true'");
   for (int r = 0; r < int(scene.rods.size()); ++r)
     if (!held[rootOf(r)])
       throw SceneError("rod '" + scene.rods[r].name +

@@ -57,8 +57,8 @@ PetscErrorCode Recorder::observe(const State &state, const Diagnostics &row) {
   dissipated_ += row.dissipated;
   work_ += std::abs(row.work.loads + row.work.supports);
   work_of_obstacles_ += std::abs(row.work.obstacles);
-  most_kinetic_ = std::max(most_kinetic_, row.energy.kinetic - row.carried);
-  const double stored = row.energy.total() - row.energy.kinetic;
+  const double kinetic = row.energy.kinetic + row.energy.body_kinetic, stored = row.energy.total() - kinetic;
+  most_kinetic_ = std::max(most_kinetic_, kinetic - row.carried);
   if (std::isnan(first_stored_)) first_stored_ = stored;
   most_stored_ = std::max(most_stored_, std::abs(stored - first_stored_));
   gained_ = std::max(gained_, -dissipated_);

@@ -30,6 +30,10 @@ std::string textOf(const Material &m) {
 }
 
 std::string textOf(const Motion &m) {
+  if (!m.arm.isZero(0)) {
+    const std::string of_body = textOf(m.at(Vec3::Zero()));
+    return of_body.empty() ? "" : of_body + ", of a body with the arm " + textOf(m.arm);
+  }
   if (m.table.empty())
     return m.moves() ? ", velocity " + textOf(m.velocity) + ", angular velocity " + textOf(m.angular_velocity) : "";
   std::string table;
@@ -46,7 +50,9 @@ std::string textOf(const Support &support) {
 
 std::string textOf(const Constraint &c, const Scene &scene) {
   std::string text =
-      c.isTie()   ? "pin to vertex " + std::to_string(c.to_vertex) + " of rod '" + scene.rods[c.to_rod].name + "'"
+      c.isToBody() ? std::string(nameOf(c.kind)) + " to body '" + scene.bodies[c.to_body].name + "' at " +
+                         textOf(c.isPin() ? c.point : c.frame.tangent)
+      : c.isTie() ? "pin to vertex " + std::to_string(c.to_vertex) + " of rod '" + scene.rods[c.to_rod].name + "'"
       : c.isPin() ? "pin to " + textOf(c.point)
                   : "rotation to tangent " + textOf(c.frame.tangent) + " and director " + textOf(c.frame.director);
   text += ", stiffness " + textOf(c.stiffness) + ", damping " + textOf(c.damping);
@@ -220,6 +226,21 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
       const int what[] = {int(&j - scene.junctions.data()), m.rod, m.vertex, m.group};
       topology.add(what, sizeof what);
     }
+  for (const Attachment &a : scene.attachments) {
+    const int what[] = {a.rod, a.vertex, a.body, int(a.weld)};
+    topology.add(what, sizeof what);
+    topology.add(a.frame.tangent.data(), sizeof(Vec3));
+    topology.add(a.frame.director.data(), sizeof(Vec3));
+  }
+  for (const Body &b : scene.bodies) { // of which the state has the centre of mass
+    topology.add(&b.own.mass, sizeof b.own.mass);
+    topology.add(b.own.centre.data(), sizeof(Vec3));
+    topology.add(b.own.inertia.data(), sizeof(Mat3));
+    add(Kind::load, "force and torque on body '" + b.name + "'", textOf(b.force) + " and " + textOf(b.torque));
+    if (!b.gravity) add(Kind::scene, "gravity on body '" + b.name + "'", "none");
+    if (!b.velocity.isZero(0) || !b.angular_velocity.isZero(0))
+      add(Kind::start, "start of body '" + b.name + "'", textOf(b.velocity) + " and " + textOf(b.angular_velocity));
+  }
   topology_hash = topology.hex();
   std::sort(names.begin(), names.end());
   for (const std::string &name : names) set.add(name + "\n");

@@ -59,7 +59,7 @@ Summary summarize(const Scene &scene, const Elements &elements, const State &sta
     const ConstraintReading &c = actions.constraint[k];
     const Constraint &constraint = scene.constraints[k];
     out.constraint.push_back(c);
-    if (constraint.isTie()) continue; // both its forces act on rods
+    if (!constraint.isToWorld()) continue; // both its forces act on rods and bodies
     out.total_force += c.force;
     if (constraint.isPin())
       out.total_moment += state.position[elements.rods[constraint.rod].first_vertex + constraint.at].cross(c.force);
@@ -110,9 +110,10 @@ std::vector<std::string> describe(const Summary &s, const Scene &scene) {
                    : textOf(s.constraint[k].moment, "N m") + ": rotation '") +
             inOneLine(c.name) + "' " + (c.isPin() ? "at vertex " : "on edge ") + std::to_string(c.at) + " of rod '" +
             scene.rods[std::size_t(c.rod)].name + "', " +
-            (c.isTie() ? "to vertex " + std::to_string(c.to_vertex) + " of rod '" +
-                             scene.rods[std::size_t(c.to_rod)].name + "', "
-                       : "") +
+            (c.isToBody() ? "to body '" + scene.bodies[std::size_t(c.to_body)].name + "', "
+             : c.isTie()  ? "to vertex " + std::to_string(c.to_vertex) + " of rod '" +
+                               scene.rods[std::size_t(c.to_rod)].name + "', "
+                         : "") +
             (c.isPin() ? textOf(s.constraint[k].distance, "m") + " off"
                        : textOf(s.constraint[k].rotation, "rad") + " off"),
         "");

@@ -122,6 +122,15 @@ BodyMotion motionOfBodies(const Scene &scene, const Elements &elements, const St
     motion.spin.push_back(rate.spin);
     motion.momentum.push_back(rate.momentum);
   }
+  for (const Body &body : scene.held_bodies) {
+    const Mat3 turn = body.motion.rotationAt(state.time);
+    motion.position.push_back(body.position + body.motion.displacementAt(state.time));
+    motion.rotation.push_back(quaternionOf(turn * body.rotation));
+    motion.velocity.push_back(body.motion.velocityAt(state.time));
+    motion.spin.push_back(body.motion.angularVelocityAt(state.time));
+    const Vec3 spin = turn.transpose() * motion.spin.back();
+    motion.momentum.push_back(turn * (body.own.inertia * spin));
+  }
   return motion;
 }
 
@@ -132,7 +141,7 @@ std::array<int, 7> sizes(const Scene &scene, const Elements &e) {
           int(e.support_slot.size()),
           int(e.constraint_slot.size()),
           int(scene.colliders.size()),
-          int(scene.bodies.size())};
+          int(scene.bodies.size() + scene.held_bodies.size())};
 }
 
 } // namespace
@@ -317,8 +326,11 @@ void TrajectoryWriter::writeXdmf() const {
                  std::to_string(polyline_entries_), "frame"};
   XdmfBlock edges{"edges", "\"Polyline\" NodesPerElement=\"2\" NumberOfElements=" + count(edges_), "topology/edges",
                   std::to_string(edges_) + " 2", "frame"};
-  XdmfBlock bodies{"bodies", "\"Polyvertex\" NodesPerElement=\"1\" NumberOfElements=" + count(scene_.bodies.size()),
-                   "topology/bodies", std::to_string(scene_.bodies.size()), "bodies in frame"};
+  XdmfBlock bodies{"bodies",
+                   "\"Polyvertex\" NodesPerElement=\"1\" NumberOfElements=" +
+                       count(scene_.bodies.size() + scene_.held_bodies.size()),
+                   "topology/bodies", std::to_string(scene_.bodies.size() + scene_.held_bodies.size()),
+                   "bodies in frame"};
   rods.position = edges.position = described(fields[0]);
   rods.has_radius = edges.has_radius = true;
   for (std::size_t k = 1; k < state_.size(); ++k) {

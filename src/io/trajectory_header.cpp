@@ -182,16 +182,16 @@ void TrajectoryWriter::writeColliders() {
 }
 
 void TrajectoryWriter::writeBodies() {
-  if (scene_.bodies.empty()) return;
-  const std::size_t n = scene_.bodies.size();
+  const std::size_t free = scene_.bodies.size(), n = free + scene_.held_bodies.size();
+  if (n == 0) return;
   std::vector<std::string> names, shapes;
   std::vector<double> parameters, mass, inertia, centre;
   std::vector<int> points;
   file_.createGroup("bodies");
   file_.createGroup("bodies/meshes");
   for (std::size_t b = 0; b < n; ++b) {
-    const Body &body = scene_.bodies[b];
-    const MassProperties &all = elements_.bodyMass(int(b));
+    const Body &body = b < free ? scene_.bodies[b] : scene_.held_bodies[b - free];
+    const MassProperties &all = b < free ? elements_.bodyMass(int(b)) : body.own;
     const std::array<double, 3> p = parametersOf(body.shape, body.size);
     points.push_back(int(b));
     names.push_back(body.name);

@@ -228,29 +228,38 @@ void Elements::weighBodies(const Scene &scene) {
   place_of_body_.resize(scene.bodies.size());
   for (std::size_t k = 0; k < bodies_.items.size(); ++k) place_of_body_[bodies_.items[k].body] = int(k);
   for (const Body &body : scene.bodies) body_mass_.push_back(body.own);
-  body_of_.assign(joined_vertices_.items.size(), -1);
   arm_.assign(joined_vertices_.items.size(), Vec3::Zero());
-  auto each = [&](auto visit) {
-    for (std::size_t k = 0; k < joined_vertices_.items.size(); ++k)
-      if (const JoinedVertex &j = joined_vertices_.items[k]; j.isOnBody())
-        visit(k, scene.attachments[j.attachment].body, scene.rods[j.rod].position[j.vertex], constants_[0][j.slot]);
-  };
-  each([&](std::size_t k, int body, const Vec3 &x, double &mass) {
-    body_of_[k] = body;
-    body_mass_[body].add({mass, x, Mat3::Zero()});
+  for (const JoinedVertex &j : joined_vertices_.items) {
+    if (!j.isOnBody() || !j.isVertex()) continue;
+    double &mass = constants_[0][j.slot];
+    body_mass_[j.body].add({mass, scene.rods[j.rod].position[j.vertex], Mat3::Zero()});
     mass = 0;
-  });
-  each([&](std::size_t k, int body, const Vec3 &x, double &) { arm_[k] = x - body_mass_[body].centre; });
+  }
+  for (const JoinedVertex &j : joined_vertices_.items)
+    if (j.isOnBody())
+      arm_[j.number] = (j.isVertex() ? scene.rods[j.rod].position[j.vertex] : scene.constraints[j.attachment].point) -
+                       body_mass_[j.body].centre;
+  for (const JoinedEdge &j : joined_edges_.items) // that springs turn to bodies: their frames are those of the springs
+    for (int k = 0; k < int(scene.constraints.size()) && j.vertex < 0; ++k)
+      if (constraint_slot[k] == j.frame) joined_frame_[&j - joined_edges_.items.data()] = scene.constraints[k].frame;
 }
 
 /// Slots behind those of supports along a rod.
 void Elements::placeConstraints(const Scene &scene, std::vector<int> free_slots) {
   constraints_.resize(rods.size());
   pins_.resize(rods.size());
+  std::vector<int> to_bodies(rods.size(), 0); // rotations to bodies so far, in the order of their edges' ties
   for (std::size_t k = 0; k < scene.constraints.size(); ++k) {
     const Constraint &c = scene.constraints[k];
     constraints_[c.rod].push_back(int(k));
-    if (c.isTie()) {
+    if (c.isToBody() && !c.isPin()) {
+      const auto edges = joinedEdges({c.rod, c.rod + 1});
+      auto isNext = [n = to_bodies[c.rod]](const JoinedEdge &j) mutable { return j.vertex < 0 && n-- == 0; };
+      ++to_bodies[c.rod];
+      constraint_slot.push_back(std::find_if(edges.begin(), edges.end(), isNext)->frame);
+      continue;
+    }
+    if (!c.isToWorld()) {
       const auto tied = ties({c.rod, c.rod + 1});
       constraint_slot.push_back(
           std::find_if(tied.begin(), tied.end(), [&](const Tie &t) { return t.constraint == int(k); })->copy);

@@ -34,7 +34,10 @@ Islands islandsOf(const Scene &scene) {
   for (const Junction &j : scene.junctions)
     for (const Junction::Member &m : j.members) join(j.members.front().rod, m.rod);
   for (const Constraint &c : scene.constraints)
-    if (c.isTie()) join(c.rod, c.to_rod);
+    if (c.isTie())
+      join(c.rod, c.to_rod);
+    else if (c.isToBody())
+      join(c.rod, scene.bodies[c.to_body].rod);
   for (const Body &b : scene.bodies) join(b.rod, b.rod);
   for (const Attachment &a : scene.attachments) join(scene.bodies[a.body].rod, a.rod);
   for (std::size_t r = 0; r < n; ++r) islands.rods[rootOf(int(r))].push_back(int(r));
@@ -96,7 +99,7 @@ std::vector<std::int64_t> workOfRods(const Scene &scene) {
   for (const Junction &j : scene.junctions)
     for (const Junction::Member &m : j.members) work[m.rod] += coupling_edges;
   for (const Constraint &c : scene.constraints)
-    if (c.isTie()) work[c.rod] += coupling_edges;
+    if (!c.isToWorld()) work[c.rod] += coupling_edges;
   for (const Attachment &a : scene.attachments) work[a.rod] += coupling_edges;
   return work;
 }

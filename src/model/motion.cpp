@@ -32,10 +32,14 @@ Vec3 slope(const std::vector<Motion::Key> &table, double time, Vec3 Motion::Key:
 } // namespace
 
 Vec3 Motion::displacementAt(double time) const {
-  return table.empty() ? Vec3(velocity * time) : interpolate(table, time, &Key::displacement);
+  const Vec3 moved = table.empty() ? Vec3(velocity * time) : interpolate(table, time, &Key::displacement);
+  return arm.isZero(0) ? moved : Vec3(moved + rotationAt(time) * arm - arm);
 }
 
-Vec3 Motion::velocityAt(double time) const { return table.empty() ? velocity : slope(table, time, &Key::displacement); }
+Vec3 Motion::velocityAt(double time) const {
+  const Vec3 moving = table.empty() ? velocity : slope(table, time, &Key::displacement);
+  return arm.isZero(0) ? moving : Vec3(moving + angularVelocityAt(time).cross(rotationAt(time) * arm));
+}
 
 Vec3 Motion::rotationVectorAt(double time) const {
   return table.empty() ? Vec3(angular_velocity * time) : interpolate(table, time, &Key::rotation);

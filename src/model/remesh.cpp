@@ -321,6 +321,7 @@ Scene remesh(const Scene &written, const std::vector<Drawing> &drawings, const s
     c.frame.director = orthonormalised(c.frame.director, c.frame.tangent);
   }
   scene.bodies = written.bodies;
+  scene.held_bodies = written.held_bodies;
   for (const Attachment &attachment : written.attachments) {
     Attachment &a = scene.attachments.emplace_back(attachment);
     const Drawing &drawing = drawings[a.rod];

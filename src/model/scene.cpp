@@ -87,6 +87,8 @@ Scene withRods(const Scene &scene, const std::vector<int> &rods) {
   }
   keep(scene.attachments, place, out.attachments);
   for (Attachment &a : out.attachments) a.body = body[a.body];
+  for (Constraint &c : out.constraints)
+    if (c.isToBody()) c.to_body = body[c.to_body];
   out.hostBodies();
   keep(scene.forces, place, out.forces);
   keep(scene.moments, place, out.moments);
@@ -219,8 +221,12 @@ DimensionlessGroups dimensionlessGroups(const Rod &rod, const Vec3 &gravity, con
 }
 
 void Scene::hostBodies() {
-  for (const Attachment &a : attachments) bodies[a.body].rod = a.rod;
-  for (const Attachment &a : attachments) bodies[a.body].rod = std::min(bodies[a.body].rod, a.rod);
+  std::vector<int> first(bodies.size(), int(rods.size()));
+  for (const Attachment &a : attachments) first[a.body] = std::min(first[a.body], a.rod);
+  for (const Constraint &c : constraints)
+    if (c.isToBody()) first[c.to_body] = std::min(first[c.to_body], c.rod);
+  for (std::size_t b = 0; b < bodies.size(); ++b)
+    if (first[b] < int(rods.size())) bodies[b].rod = first[b];
 }
 
 bool Scene::hasCouples() const {

@@ -155,7 +155,7 @@ void IncrementalPotential::assemble(RodSet islands, HessianKind hessian) {
   }
   for (const JoinedVertex &j : elements_.joinedVertices(islands)) { // forces turn with the arms that they act at
     if (!j.isOnBody() || hessian == HessianKind::none) continue;
-    const JoinedBody &body = elements_.body(elements_.bodyOf(j));
+    const JoinedBody &body = elements_.body(j.body);
     const Mat3 more = curvatureOfArm(derivatives_.equilibrium.vector(0, j.slot), dofs_.arm(j));
     const RodRange &rod = elements_.rods[body.rod];
     for (int a = 0; a < 3; ++a)

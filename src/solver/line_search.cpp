@@ -292,6 +292,9 @@ void NewtonSolver::predict() {
     dofs.copyJoined(island, work_->increment);
     potential_->turnFrames(island, work_->increment);
     if (!potential_->tryMove(work_->increment, 1, island, kind, work_->trial)) continue;
+    if (dofs.isJoined(island)) // whose edges get longer by squares: forces as if they did not
+      for (int r = island.begin; r < island.end; ++r)
+        potential_->setTrialForces(work_->increment, 1, r, kind, work_->trial);
     double before = 0, after = 0;
     for (int r = island.begin; r < island.end; ++r) {
       work_->tried[r] = potential_->rodEnergy(work_->trial, r);

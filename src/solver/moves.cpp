@@ -99,6 +99,16 @@ double IncrementalPotential::addExcess(const Planes &increment, double scale, co
     force.setVector(0, i + 1, force.vector(0, i + 1) + pull);
     most = std::max(most, std::abs(excess) * inverse);
   }
+  for (const Tie &t : elements_.ties({r, r + 1})) { // points of bodies go on circles
+    if (!t.isToBody()) continue;
+    const Vec3 linear = iterate_.displacements<double>(t.slot, iterate_, t.copy) +
+                        scale * (increment.vector(0, t.slot) - increment.vector(0, t.copy)),
+               excess = trial.displacements<double>(t.slot, trial, t.copy) - linear,
+               pull = scene_.constraints[t.constraint].stiffness * excess;
+    force.setVector(0, t.slot, force.vector(0, t.slot) + pull);
+    force.setVector(0, t.copy, force.vector(0, t.copy) - pull);
+    most = std::max(most, excess.norm() / scales_[r].shortest_edge);
+  }
   return most;
 }
 

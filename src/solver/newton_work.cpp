@@ -6,7 +6,7 @@ namespace {
 /// Diagonal by which an indefinite Hessian is shifted: the mass of each position, and for twists a moment of the same
 /// mass over the edge's length, so that both see curvature on the scale of an edge alike. Independent of units and of
 /// the time step.
-Planes shiftMetric(const Elements &e, const DofMap &dofs) {
+Planes shiftMetric(const Elements &e, const DofMap &dofs, bool dynamic) {
   Planes metric = dofs.makePlanes();
   const double *mass = e.mass(), *length = e.restLength();
   for (const RodRange &rod : e.rods) {
@@ -18,8 +18,21 @@ Planes shiftMetric(const Elements &e, const DofMap &dofs) {
   }
   for (const JoinedEdge &j : e.joinedEdges(dofs.all())) // as the twist of the edge
     metric.setVector(0, j.frame, Vec3::Constant(metric[3][e.rods[j.rod].slot(j.edge)]));
+  // In statics what is tied to a body sees curvature as its neighbours do, however heavy the body is.
+  std::vector<int> ties(e.bodyCount(), 0);
+  for (const JoinedVertex &j : e.joinedVertices(dofs.all())) {
+    if (dynamic || !j.isOnBody() || !j.isVertex()) continue;
+    const RodRange &rod = e.rods[j.rod];
+    const double beside = mass[rod.slot(j.vertex > 0 ? j.vertex - 1 : rod.closed ? rod.vertices - 1 : 1)];
+    metric.setVector(0, j.slot, Vec3::Constant(0.5 * beside));
+    const JoinedBody &b = e.body(j.body);
+    const double arm = e.armAsDrawn(j).norm() + length[rod.slot(std::min(j.vertex, rod.edges - 1))];
+    metric.setVector(0, b.rotation, metric.vector(0, b.rotation) + Vec3::Constant(0.5 * beside * arm * arm));
+    ++ties[j.body];
+  }
   for (const JoinedBody &b : e.bodies(dofs.all())) {
     const MassProperties &all = e.bodyMass(b.body);
+    if (ties[b.body] > 0) continue;
     metric.setVector(0, b.position, Vec3::Constant(all.mass));
     metric.setVector(0, b.rotation, Vec3::Constant(all.inertia.trace() / 3));
   }
@@ -52,7 +65,8 @@ NewtonWork::NewtonWork(const IncrementalPotential &potential, int slots)
       energy_known(active.size(), false), residual(active.size()), moving(active.size(), false),
       standstill(active.size()), left(active.size(), 0), load_reach(active.size(), 0), load_energy(active.size(), 0),
       increment(slot_size, slots), coordinates(increment), trial(slots), motion(potential.dofs().makePlanes()),
-      metric(shiftMetric(potential.elements(), potential.dofs())), edge_metric(edgeMetric(potential)) {}
+      metric(shiftMetric(potential.elements(), potential.dofs(), potential.isDynamic())),
+      edge_metric(edgeMetric(potential)) {}
 
 void NewtonWork::setOrigin(int first_slot) {
   increment.setOrigin(first_slot);

@@ -33,9 +33,13 @@ std::vector<RodScale> rodScales(const Scene &scene, const Elements &elements) {
   for (const Constraint &c : scene.constraints)
     if (c.isTie()) scales[c.to_rod].pinning += c.stiffness;
   std::vector<int> rods_of(scene.bodies.size(), 0);
-  for (const Attachment &a : scene.attachments) ++rods_of[a.body];
-  for (const Attachment &a : scene.attachments)
-    scales[a.rod].load += bodyLoad(scene, elements, a.body) / rods_of[a.body];
+  auto each = [&](auto visit) {
+    for (const Attachment &a : scene.attachments) visit(a.rod, a.body);
+    for (const Constraint &c : scene.constraints)
+      if (c.isToBody()) visit(c.rod, c.to_body);
+  };
+  each([&](int, int body) { ++rods_of[body]; });
+  each([&](int rod, int body) { scales[rod].load += bodyLoad(scene, elements, body) / rods_of[body]; });
   return scales;
 }
 
@@ -113,7 +117,7 @@ void includeBody(const Elements &elements, const JoinedBody &body, const Step &s
   const MassProperties &all = elements.bodyMass(body.body);
   double size = std::sqrt(all.inertia.trace() / all.mass);
   for (const JoinedVertex &j : elements.joinedVertices({0, int(elements.rods.size())}))
-    if (j.isOnBody() && elements.bodyOf(j) == body.body) size = std::max(size, elements.armAsDrawn(j).norm());
+    if (j.isOnBody() && j.body == body.body) size = std::max(size, elements.armAsDrawn(j).norm());
   const double force = out_of_balance.vector(0, body.position).norm(),
                moment = out_of_balance.vector(0, body.rotation).norm(), by = load > 0 ? load : unit;
   residual->force = std::max(residual->force, force / by);

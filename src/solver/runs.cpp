@@ -19,7 +19,10 @@ static bool runsThrough(const DofMap &dofs, const JoinedVertex &j) {
 bool CondensedFactor::suits(const DofMap &dofs, RodSet rods) {
   for (int r = rods.begin; r < rods.end; ++r)
     if (dofs.rods()[r].closed) return false;
+  for (const JoinedEdge &j : dofs.joinedEdges(rods))
+    if (j.vertex < 0) return false;
   for (const JoinedVertex &j : dofs.joinedVertices(rods)) {
+    if (!j.isVertex()) return false;
     if (!runsThrough(dofs, j)) continue;
     if (dofs.isHeld(dofs.rods()[j.rod].first_vertex + j.vertex + 1)) return false;
     for (const JoinedVertex &other : dofs.joinedVertices({j.rod, j.rod + 1}))
@@ -31,8 +34,8 @@ bool CondensedFactor::suits(const DofMap &dofs, RodSet rods) {
 bool CondensedFactor::pays(const DofMap &dofs, RodSet rods) {
   constexpr int most = 800; // nets of scissors, docs/performance.md
   const auto joined = dofs.joinedVertices(rods);
-  return std::count_if(joined.begin(), joined.end(), [&](const JoinedVertex &j) { return runsThrough(dofs, j); }) <=
-         most;
+  return std::count_if(joined.begin(), joined.end(),
+                       [&](const JoinedVertex &j) { return j.isVertex() && runsThrough(dofs, j); }) <= most;
 }
 
 /// Numbers the unknowns of the junctions, and cuts the rods there.

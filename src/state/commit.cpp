@@ -100,8 +100,8 @@ void settleBodies(const Elements &elements, RodSet islands, State &state) {
     rate.spin = turned * elements.bodyMass(b.body).inertia.ldlt().solve(turned.transpose() * rate.momentum);
   }
   for (const JoinedVertex &j : elements.joinedVertices(islands)) {
-    if (!j.isOnBody()) continue;
-    const JoinedBody &b = elements.body(elements.bodyOf(j));
+    if (!j.isOnBody() || !j.isVertex()) continue;
+    const JoinedBody &b = elements.body(j.body);
     const Vec3 arm = rotationOf(state, b.group) * elements.armAsDrawn(j);
     const int v = elements.rods[j.rod].first_vertex + j.vertex;
     Vec3 &high = state.position[v], &low = state.position_low[v];

@@ -102,8 +102,12 @@ void Retraction::turnArm(const C &from, const Planes &increment, double scale, c
   to.setFrame(j.frame, {rotation * before.tangent, rotation * before.director, 1});
   to.setPosition(j.frame, from.positionAt(j.frame) + turn, Vec3::Zero());
   const Vec3 beyond = rotation * arm - arm - turn.cross(arm);
-  Vec3 high = to.positionAt(j.slot), low = to.values().vector(C::position_low, j.slot);
-  for (int a = 0; a < 3; ++a) addTwoWords(high[a], low[a], beyond[a]);
+  const Configuration &moved = j.isVertex() ? to : from; // vertices have gone by their increments already
+  Vec3 high = moved.positionAt(j.slot), low = moved.values().vector(C::position_low, j.slot);
+  for (int a = 0; a < 3; ++a) {
+    if (!j.isVertex()) addTwoWords(high[a], low[a], scale * increment[a][j.slot]);
+    addTwoWords(high[a], low[a], beyond[a]);
+  }
   to.setPosition(j.slot, high, low);
   to.closeRing(elements_.rods[j.rod]);
 }
@@ -335,7 +339,8 @@ static void moveAll(const RodRange &rod, const Vec3 &by, C &to) {
                  about = 0.5 * turn.dot(before.tangent + after.tangent);
     to[C::spin][j.frame] = from[C::spin][j.frame] + principal + 2 * pi * std::round((about - principal) / (2 * pi));
   }
-  for (const Tie &t : elements_.ties({r, r + 1})) move(t.copy);
+  for (const Tie &t : elements_.ties({r, r + 1}))
+    if (!t.isToBody()) move(t.copy);
   // Whole turns of the twist angle by continuity: the angle moves by the difference of the two spins, and by a little
   // holonomy. Half a turn is a barrier of the measure `tan`: no step leads across it.
   bool possible = true;

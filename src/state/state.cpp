@@ -133,7 +133,7 @@ void setTarget(const Constraint &constraint, int slot, double motion_time, Confi
 
 void setTargets(const Scene &scene, const Elements &elements, double motion_time, Configuration &c) {
   for (std::size_t k = 0; k < scene.constraints.size(); ++k)
-    if (!scene.constraints[k].isTie()) // which has another vertex for its target: see setRod
+    if (scene.constraints[k].isToWorld()) // others have a vertex or a body for their target: see setRod
       setTarget(scene.constraints[k], elements.constraint_slot[k], motion_time, c);
 }
 
@@ -196,14 +196,21 @@ Frame joinedFrame(const State &state, const Elements &elements, const JoinedEdge
     setTurned(b.rotation, b.group);
   }
   for (const JoinedVertex &j : elements.joinedVertices({r, r + 1}))
-    if (j.isOnBody()) setTurned(j.frame, elements.body(elements.bodyOf(j)).group);
+    if (j.isOnBody()) {
+      setTurned(j.frame, elements.body(j.body).group);
+      if (j.isVertex()) continue;
+      Vec3 high = state.body_position[j.body], low = state.body_position_low[j.body];
+      const Vec3 arm = rotationOf(state, elements.body(j.body).group) * elements.armAsDrawn(j);
+      for (int a = 0; a < 3; ++a) addTwoWords(high[a], low[a], arm[a]);
+      c.setPosition(j.slot, high, low);
+    }
   for (const JoinedEdge &j : elements.joinedEdges({r, r + 1})) {
     c.setFrame(j.frame, joinedFrame(state, elements, j));
     c.setPosition(j.frame, Vec3::Zero(), Vec3::Zero());
     c[C::spin][j.frame] = 0;
   }
   for (const Tie &t : elements.ties({r, r + 1}))
-    c.setPosition(t.copy, state.position[t.vertex], state.position_low[t.vertex]);
+    if (!t.isToBody()) c.setPosition(t.copy, state.position[t.vertex], state.position_low[t.vertex]);
   forCells(elements, r, [&]<class T>(const LooseCell &cell, int count) {
     const auto frames = cellFrames<T>(c, cell, count);
     write(c[C::twist] + cell.slot,

@@ -328,7 +328,17 @@ junctions:
 - {name: soft, type: pin, rod: c, vertex: last, to: {rod: a, closest: true}, stiffness: 2}
 - {type: pin, rod: b, vertex: 6, to: {rod: b, vertex: 2}, stiffness: 1, damping: 0.05}
 """)
-    for scene, integrator in (("tied", "euler"), ("tied", "bdf2"), ("tied", "midpoint"), ("joined", "euler"), ("joined", "bdf2"),
+    with open(tmp + "/joined.yaml") as scene:
+        write(tmp + "/bodies.yaml", scene.read() + """bodies:
+- {name: bob, box: {size: [0.04, 0.02, 0.02]}, density: 1000, position: [0.5, 0, 0.02], angular_velocity: [3, 1, 0]}
+- {name: puck, sphere: {radius: 0.02}, density: 500, position: [0.15, 0.05, 0], torque: [0, 0, 1e-5]}
+constraints:
+- {type: weld, rod: c, vertex: last, body: bob}
+- {type: pin, rod: a, vertex: 6, body: puck, stiffness: 5, damping: 0.01}
+- {type: rotation, rod: a, edge: 6, body: puck, stiffness: 0.01}
+""")
+    for scene, integrator in (("bodies", "euler"), ("bodies", "bdf2"), ("bodies", "midpoint"), ("bodies", "generalized_alpha"),
+                              ("bodies", "energy_momentum"), ("tied", "euler"), ("tied", "bdf2"), ("tied", "midpoint"), ("joined", "euler"), ("joined", "bdf2"),
                               ("joined", "sdirk2"), ("joined", "midpoint"), ("joined", "generalized_alpha")):
         base = ["-scene", f"{tmp}/{scene}.yaml", "-integrator", integrator, "-output_interval", 0.05]
         run(0, *base, "-t_end", 0.1, "-output_dir", tmp + "/half")

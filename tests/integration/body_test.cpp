@@ -6,7 +6,7 @@
 namespace tendril::test {
 namespace {
 
-const char *const every_integrator[] = {"euler",   "bdf2",     "bdf3",     "sdirk2",          "sdirk23",
+const char *const every_integrator[] = {"euler",   "bdf2",     "bdf3",        "sdirk2",          "sdirk23",
                                         "sdirk33", "midpoint", "symplectic2", "energy_momentum", "generalized_alpha"};
 
 Body bodyOf(MassProperties own, const Vec3 &at) {
@@ -36,9 +36,7 @@ Mat3 rotationOfBody(const Simulation &run, int body = 0) {
   return rotationOf(run.state, run.elements->body(body).group);
 }
 
-double turnError(const Simulation &run, const Mat3 &expected) {
-  return (rotationOfBody(run) - expected).norm();
-}
+double turnError(const Simulation &run, const Mat3 &expected) { return (rotationOfBody(run) - expected).norm(); }
 
 /// A spin about an axis near the middle one flips over, by Jacobi's functions.
 TEST(Bodies, ATumblingBodyConvergesAtTheOrderOfItsMethod) {
@@ -83,6 +81,18 @@ TEST(Bodies, AThrownBodyFliesAParabola) {
   }
 }
 
+/// What is fixed on a body that goes round moves on a circle.
+TEST(Bodies, MotionsOfBodiesHaveArms) {
+  Motion motion;
+  motion.velocity = Vec3(1, 0, 0);
+  motion.angular_velocity = Vec3(0, 0, 2);
+  const Motion there = motion.at({0, 3, 0});
+  EXPECT_LT((there.displacementAt(pi / 4) - Vec3(pi / 4 - 3, -3, 0)).norm(), 1e-14);
+  const double h = 1e-6;
+  EXPECT_LT(((there.displacementAt(0.3 + h) - there.displacementAt(0.3 - h)) / (2 * h) - there.velocityAt(0.3)).norm(),
+            1e-8);
+}
+
 /// A weight whose centre is the end of a rod is a dead force there, once its mass is counted.
 TEST(Bodies, AHungBodyIsADeadForce) {
   for (const bool weld : {false, true}) {
@@ -124,7 +134,8 @@ TEST(Bodies, AWeightlessBodyIsARigidJunction) {
     body.bodies = {bodyOf({1e-9, Vec3::Zero(), 1e-9 * Mat3::Identity()}, {0.5, 0, 0})};
     body.attachments = {tie(body, 0, 10, 0, true), tie(body, 1, 0, 0, true)};
     for (Attachment &a : body.attachments) // junctions tie the frames of the edges themselves
-      a.frame = {body.rods[a.rod].edge(a.rod == 0 ? 9 : 0).normalized(), body.rods[a.rod].director[a.rod == 0 ? 9 : 0], 1};
+      a.frame = {body.rods[a.rod].edge(a.rod == 0 ? 9 : 0).normalized(), body.rods[a.rod].director[a.rod == 0 ? 9 : 0],
+                 1};
     LoopSettings settings = dynamic ? dynamics(0.01, 0.2) : statics(4);
     if (dynamic) settings.integrator.name = "bdf2";
     Simulation one, two;
@@ -179,6 +190,86 @@ TEST(Bodies, AFreeAssemblyKeepsItsMomenta) {
   }
 }
 
+Constraint springTo(const Scene &scene, Constraint::Kind kind, int rod, int at, double stiffness) {
+  Constraint c = constraintOn(rod, at, kind, stiffness);
+  c.to_body = 0;
+  if (c.isPin())
+    c.point = scene.rods[rod].position[at];
+  else
+    c.frame = {scene.rods[rod].edge(at).normalized(), scene.rods[rod].director[at], 1};
+  return c;
+}
+
+/// Springs in place of a weld come to it as 1/k, in steps of time in no more iterations.
+TEST(Bodies, SpringsComeToTheWeldAsTheyStiffen) {
+  auto scene = [](double factor) {
+    Scene scene;
+    scene.gravity = Vec3(0, 0, -1);
+    scene.rods = {beam({0, 0, 0}, {1, 0, 0}, 16, "rod")};
+    scene.supports = {hold(scene, 0, 0, Support::Kind::clamp)};
+    scene.bodies = {bodyOf(boxMass({0.2, 0.2, 0.2}, 300), {1.1, 0.05, 0})};
+    if (factor == 0) {
+      scene.attachments = {tie(scene, 0, 16, 0, true)};
+      return scene;
+    }
+    scene.constraints = {springTo(scene, Constraint::Kind::pin, 0, 16, 1e3 * factor),
+                         springTo(scene, Constraint::Kind::rotation, 0, 15, 10 * factor)};
+    scene.constraints[0].name = "place";
+    return scene;
+  };
+  for (const bool dynamic : {false, true}) {
+    LoopSettings settings = dynamic ? dynamics(0.01, 0.3) : statics(4);
+    if (dynamic) settings.integrator.name = "bdf2";
+    settings.solve.rounding_tolerance = 1e-3;
+    Simulation limit;
+    runTo(limit, scene(1e7), settings); // what is left then is the difference between edge and vertex
+    double off[4];
+    int iterations[4] = {};
+    for (int k = 0; k < 4; ++k) {
+      Simulation run;
+      runTo(run, scene(std::pow(10, k)), settings, &iterations[k]);
+      off[k] = (run.state.body_position[0] - limit.state.body_position[0]).norm();
+    }
+    for (int k = 1; k < 4; ++k) {
+      // By 1/k; curved at the soft end. Newton's tolerance of 1e-6 of the load is below.
+      EXPECT_NEAR(off[k - 1] / off[k], 10, 2.5) << dynamic << " " << off[k - 1] << " " << off[k];
+      // In statics a spring that is stiff beside the rod turns large trials away: by a factor of 1.5 for each of 10.
+      EXPECT_LE(iterations[k], 1 + iterations[0] * (dynamic ? 1.5 : std::pow(1.5, k))) << dynamic;
+    }
+    Simulation weld;
+    runTo(weld, scene(0), settings);
+    const double moved = (weld.state.body_position[0] - Vec3(1.1, 0.05, 0)).norm();
+    // The spring holds the edge, the weld the end beyond half an edge of 1/16.
+    EXPECT_LT((weld.state.body_position[0] - limit.state.body_position[0]).norm(), 0.1 * moved) << dynamic;
+    EXPECT_GT(moved, 0.01) << dynamic;
+  }
+}
+
+/// A damper between a rod and a body keeps the momentum of both, and takes energy.
+TEST(Bodies, SpringsActOnBothEnds) {
+  Scene scene;
+  scene.gravity = Vec3::Zero();
+  scene.rods = {beam({0, 0, 0}, {1, 0, 0}, 8, "rod")};
+  scene.bodies = {bodyOf(boxMass({0.1, 0.2, 0.3}, 100), {1.2, 0.02, 0})};
+  scene.bodies[0].velocity = Vec3(0.3, 0.1, 0);
+  scene.bodies[0].angular_velocity = Vec3(1, 0, 0.5);
+  scene.constraints = {springTo(scene, Constraint::Kind::pin, 0, 8, 50),
+                       springTo(scene, Constraint::Kind::rotation, 0, 7, 2)};
+  for (Constraint &c : scene.constraints) c.damping = 0.05;
+  scene.constraints[0].name = "place";
+  scene.constraints[0].saturation = 0.02;
+  for (const std::string name : {"euler", "bdf2", "midpoint"}) {
+    LoopSettings settings = dynamics(0.005, 0.5);
+    settings.integrator.name = name;
+    Simulation run;
+    runTo(run, scene, settings);
+    Vec3 linear = run.elements->bodyMass(0).mass * run.state.body_rate[0].translation;
+    for (int v = 0; v <= 8; ++v) linear += run.elements->mass()[run.elements->vertex_slot[v]] * run.state.velocity[v];
+    EXPECT_LT((linear - 0.6 * Vec3(0.3, 0.1, 0)).norm(), 2e-6) << name; // Newton's tolerance over 100 steps
+    EXPECT_GT((run.state.position[8] - Vec3(1, 0, 0)).norm(), 0.02) << name;
+  }
+}
+
 /// Exact derivatives: differences of the energy in statics, where all of it is a potential.
 TEST(Bodies, DerivativesAreThoseOfTheEnergy) {
   Scene scene;
@@ -189,8 +280,17 @@ TEST(Bodies, DerivativesAreThoseOfTheEnergy) {
   scene.bodies[0].force = Vec3(0.4, 1, -2);
   scene.attachments = {tie(scene, 0, 5, 0, true), tie(scene, 1, 2, 0, true)};
   scene.forces = {{1, 2, Vec3(1, 2, 3)}, {0, 5, Vec3(-1, 1, 0)}};
-  for (const bool weld : {true, false}) {
+  Scene with_springs = scene;
+  with_springs.attachments.clear();
+  with_springs.constraints = {springTo(scene, Constraint::Kind::pin, 0, 5, 70),
+                              springTo(scene, Constraint::Kind::rotation, 1, 2, 3),
+                              springTo(scene, Constraint::Kind::pin, 1, 2, 40)};
+  with_springs.constraints[0].point += Vec3(0.02, 0.01, -0.03);
+  with_springs.constraints[2].saturation = 0.5; // its law has a kink there
+  for (const std::string what : {"weld", "pin", "springs"}) {
+    const bool weld = what == "weld";
     for (Attachment &a : scene.attachments) a.weld = weld;
+    if (what == "springs") scene = with_springs;
     Simulation sim;
     LoopSettings settings = statics();
     settings.mixed = false;
@@ -224,10 +324,10 @@ TEST(Bodies, DerivativesAreThoseOfTheEnergy) {
       ASSERT_TRUE(p.tryMove(v, (k - 2) * h, all, RetractionKind::additive, trial));
       e[k] = p.energy(trial, all);
     }
-    EXPECT_NEAR((e[0] - 8 * e[1] + 8 * e[3] - e[4]) / (12 * h), slope, 1e-7 * std::abs(slope)) << weld;
+    EXPECT_NEAR((e[0] - 8 * e[1] + 8 * e[3] - e[4]) / (12 * h), slope, 1e-7 * std::abs(slope)) << what;
     EXPECT_NEAR((-e[0] + 16 * e[1] - 30 * e[2] + 16 * e[3] - e[4]) / (12 * h * h), curvature,
                 1e-6 * std::abs(curvature))
-        << weld;
+        << what;
   }
 }
 

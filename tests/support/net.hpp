@@ -79,13 +79,12 @@ inline void embody(Net &net) {
     Body body;
     body.own = {1, Vec3::Zero(), Mat3::Identity()};
     for (const Junction::Member &m : junction.members) {
-      const bool held = std::any_of(net.scene.supports.begin(), net.scene.supports.end(), [&](const Support &s) {
-        return s.rod == m.rod && s.vertex == m.vertex;
-      });
+      const bool held = std::any_of(net.scene.supports.begin(), net.scene.supports.end(),
+                                    [&](const Support &s) { return s.rod == m.rod && s.vertex == m.vertex; });
       const Rod &rod = net.scene.rods[m.rod];
       if (!held)
-        net.scene.attachments.push_back({"a", m.rod, m.vertex, int(net.scene.bodies.size()), m.group >= 0,
-                                         frameAtVertex(rod, m.vertex)});
+        net.scene.attachments.push_back(
+            {"a", m.rod, m.vertex, int(net.scene.bodies.size()), m.group >= 0, frameAtVertex(rod, m.vertex)});
     }
     net.scene.bodies.push_back(body);
   }
@@ -150,8 +149,7 @@ inline void fill(Net &net, Random &random, double diagonal) {
     for (const int slot : {b.position, b.rotation})
       for (int r = 0; r < 3; ++r)
         for (int c = r; c < 3; ++c)
-          net.blocks.entry(net.dofs.rods()[b.rod],
-                           EdgeBlocks::vertex(r, c))[slot - net.dofs.rods()[b.rod].first_slot] =
+          net.blocks.entry(net.dofs.rods()[b.rod], EdgeBlocks::vertex(r, c))[slot - net.dofs.rods()[b.rod].first_slot] =
               random() + (r == c ? diagonal : 0);
   for (const Tie &t : net.dofs.ties(all)) // often of rank two or one
     for (int r = 0; r < 3; ++r)

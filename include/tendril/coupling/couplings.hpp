@@ -14,6 +14,7 @@ std::vector<std::unique_ptr<Term>> makeTerms(const Scene &scene, const Elements 
 std::unique_ptr<Term> makePins(const Scene &, const Elements &);
 std::unique_ptr<Term> makeTies(const Scene &, const Elements &);
 std::unique_ptr<Term> makeRotations(const Scene &, const Elements &);
+std::unique_ptr<Term> makeRotationsToBodies(const Scene &, const Elements &);
 /// That of rods with obstacles; null where there are none.
 std::unique_ptr<Term> makeContact(const Scene &, const Elements &);
 

@@ -10,10 +10,13 @@
 
 namespace tendril {
 
-/// Where a stencil acts: on a vertex (its position, 3 variables), an edge (its vector and twist, 4 variables), or a
-/// vertex and what a tie has it tied to (their difference, 3 variables).
-enum class SiteKind { vertex, edge, tie };
-constexpr int sizeOf(SiteKind kind) { return kind == SiteKind::edge ? edge_size : 3; }
+/// Where a stencil acts: on a vertex (its position, 3 variables), an edge (its vector and twist, 4 variables), a vertex
+/// and what a tie has it tied to (their difference, 3 variables), or an edge and the frame of a body (4 and its spin,
+/// 3).
+enum class SiteKind { vertex, edge, tie, edge_to_frame };
+constexpr int sizeOf(SiteKind kind) {
+  return kind == SiteKind::edge_to_frame ? edge_size + 3 : kind == SiteKind::edge ? edge_size : 3;
+}
 
 /// Derivatives of one stencil over the variables of its sites, one site after the other.
 template <int n> struct Local {
@@ -37,6 +40,21 @@ void addSite(const Local<n> &local, int first, int slot, const BlockPlanes *bloc
   for (int a = 0; a < sizeOf(kind); ++a)
     for (int b = a; b < sizeOf(kind); ++b)
       (kind == SiteKind::edge ? blocks->own(a, b) : blocks->vertex(a, b))[at] += local.hessian(first + a, first + b);
+}
+
+/// The same of an edge with a frame of a body. \param frame, cell slots of the frame, and of what both have between
+/// them
+inline void addEdgeToFrame(const Local<edge_size + 3> &local, int slot, int frame, int cell, const BlockPlanes *blocks,
+                           Derivatives &out) {
+  Local<edge_size> edge;
+  edge.gradient = local.gradient.head<4>();
+  edge.hessian = local.hessian.topLeftCorner<4, 4>();
+  addSite<SiteKind::edge>(edge, 0, slot, blocks, out);
+  for (int a = 0; a < 3; ++a) out.equilibrium[a][frame] += local.gradient[edge_size + a];
+  for (int a = 0; a < 3 && blocks; ++a) {
+    for (int b = a; b < 3; ++b) blocks->vertex(a, b)[frame] += local.hessian(edge_size + a, edge_size + b);
+    for (int c = 0; c < edge_size; ++c) blocks->across(a, c)[cell] += local.hessian(edge_size + a, c);
+  }
 }
 
 /// A term made of stencils that act on one site each: they stand in the blocks of their rod, which stays on its own
@@ -84,7 +102,11 @@ public:
     for (const Stencil &s : of_[rod]) {
       Local<sizeOf(Stencil::site)> local;
       s.derivatives(c, kind, local);
-      addSite<Stencil::site>(local, 0, s.slot, kind == HessianKind::none ? nullptr : &blocks, out, s.target);
+      const BlockPlanes *const to = kind == HessianKind::none ? nullptr : &blocks;
+      if constexpr (Stencil::site == SiteKind::edge_to_frame)
+        addEdgeToFrame(local, s.slot, s.target, s.cell, to, out);
+      else
+        addSite<Stencil::site>(local, 0, s.slot, to, out, s.target);
     }
   }
   std::array<Vec3, 2> actionFrom(int slot, const Configuration &c, int rod) const override {

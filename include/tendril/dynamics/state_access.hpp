@@ -69,6 +69,7 @@ private:
   [[noreturn]] void fail(const std::string &what) const;
   void checkCount(std::size_t given, int wanted, const char *what) const;
   bool holds(int vertex, bool (Support::*what)() const) const;
+  bool isOnBody(int vertex) const;
   Frame edgeFrame(const State &state, int edge) const;
   Frame frameAt(const State &state, int slot) const;
   int vertexOf(const LooseCell &cell) const;

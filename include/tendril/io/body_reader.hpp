@@ -9,8 +9,10 @@ namespace tendril {
 
 /// Adds what a block of `bodies` says to the scene.
 void readBody(const YamlValue &value, SceneFile &out);
-/// Adds the exact ties that a block of `constraints` says: it has a `body`, or is of `type: weld`. Bodies and supports
-/// are there. \param name of the block
+/// The body that the key of a constraint names.
+SceneFile::BodyPlace findBody(const YamlValue &value, const SceneFile &file);
+/// Adds the exact ties that a block of `constraints` says: it has a `body` and no stiffness, or is of `type: weld`.
+/// Bodies and supports are there. \param name of the block
 void readAttachments(YamlMap &map, const std::string &name, SceneFile &out);
 
 } // namespace tendril

@@ -27,8 +27,8 @@ private:
   double end_;
   const char *time_, *step_; ///< their names
   bool terminal_, open_line_ = false;
-  double next_report_ = 0; ///< fraction of the run at which the next line is due when there is no terminal
-  double next_line_ = 0;   ///< wall time of the run at which the line on a terminal is due again [s]
+  double next_report_ = 0;   ///< fraction of the run at which the next line is due when there is no terminal
+  double next_line_ = 0;     ///< wall time of the run at which the line on a terminal is due again [s]
   std::FILE *log_ = nullptr; ///< null on ranks that do not speak
   void endLine();
   void tell(const std::string &line, bool rewrites, bool logs);

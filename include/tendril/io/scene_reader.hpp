@@ -36,7 +36,14 @@ struct SceneFile {
   std::map<std::pair<int, int>, std::string> joined; ///< vertices in junctions, by rod and number: which
   /// Numbers of supports by the rods and vertices that they hold.
   std::map<std::pair<int, int>, std::vector<int>> supports_at;
+  /// A body of the file: its number among those that are free, or among those that are held.
+  struct BodyPlace {
+    bool held;
+    int index;
+  };
+  std::vector<BodyPlace> bodies;           ///< in the order of the file
   std::map<std::string, int> body_numbers; ///< by names
+  const Body &bodyAt(BodyPlace at) const { return (at.held ? scene.held_bodies : scene.bodies)[at.index]; }
   /// Constraints that tie vertices to bodies, by rod and vertex.
   std::map<std::pair<int, int>, std::string> attached;
   std::vector<Drawing> drawings; ///< per rod

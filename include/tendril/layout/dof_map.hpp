@@ -138,6 +138,7 @@ private:
   PetscErrorCode createSection(PetscSection *section) const;
   void join(const Scene &scene, std::vector<int> free_slots);
   void joinBodies(const Scene &scene, std::vector<int> &free_slots);
+  void tieToBodies(const Scene &scene, std::vector<int> &free_slots);
   void tieEdges(const Scene &scene, JoinedEdge joined, std::vector<int> &free_slots);
   void makeIsland(RodSet a, RodSet b);
 };

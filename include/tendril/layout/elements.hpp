@@ -80,7 +80,6 @@ public:
   int bodyCount() const { return int(body_mass_.size()); }
   /// Of a body with what rods tied to it add, as drawn.
   const MassProperties &bodyMass(int body) const { return body_mass_[body]; }
-  int bodyOf(const JoinedVertex &j) const { return body_of_[j.number]; }
   /// From the centre of mass of its body to a vertex, as drawn [m].
   const Vec3 &armAsDrawn(const JoinedVertex &j) const { return arm_[j.number]; }
   int vertices() const { return int(vertex_slot.size()); }
@@ -97,8 +96,8 @@ private:
   ByRod<Tie> ties_;
   ByRod<JoinedBody> bodies_;
   std::vector<MassProperties> body_mass_;
-  std::vector<int> place_of_body_, body_of_; ///< of each body in bodies_; of each joined vertex, its body or -1
-  std::vector<Vec3> arm_;                    ///< per joined vertex
+  std::vector<int> place_of_body_; ///< of each body in bodies_
+  std::vector<Vec3> arm_;          ///< per joined vertex
   void weighBodies(const Scene &scene);
   std::vector<Frame> joined_frame_;           ///< as drawn, of unit length
   std::vector<std::vector<int>> constraints_; ///< per rod

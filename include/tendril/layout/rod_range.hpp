@@ -73,16 +73,18 @@ private:
 
 /// A vertex of a rod in a junction. The position of the first member is an unknown, those of the others are its copies.
 struct JoinedVertex {
-  int rod, vertex;
+  int rod, vertex;      ///< -1: a point of a body that is no vertex, but what a constraint draws one to
   int slot, first_slot; ///< its own, and that of the first member
   int junction;         ///< of the scene; -1 of a body
-  int attachment = -1;  ///< to a body, of the scene
+  int attachment = -1;  ///< to a body, of the scene; of what is no vertex, the number of the constraint
+  int body = -1;        ///< of the scene
   /// Of a point of a body: a slot of its own for the body's frame, and that of the body's spin. `first_slot` is that of
   /// its centre of mass, and the vertex moves by d + spin x arm, with the arm from there to it.
   int frame = -1, first_frame = -1;
   int number = -1; ///< over all joined vertices
   bool isCopy() const { return slot != first_slot; }
   bool isOnBody() const { return frame >= 0; }
+  bool isVertex() const { return vertex >= 0; }
 };
 
 /// A rigid body beside a rod: the displacement of its centre of mass stands at one slot as a position, its spin at
@@ -96,7 +98,7 @@ struct JoinedBody {
 /// half cell sees is that of the edge as drawn, turned as the group has turned, at a slot of its own. Its spin stands
 /// there as a position does elsewhere: an unknown at the first edge of the group, of which the others have copies.
 struct JoinedEdge {
-  int rod, edge, vertex;
+  int rod, edge, vertex;        ///< vertex -1: a constraint turns the edge to the frame, and there is no half cell
   int cell, frame, first_frame; ///< slots
   int group;                    ///< over all junctions, then bodies
   bool of_body;
@@ -108,8 +110,9 @@ struct JoinedEdge {
 /// matter of that rod alone. Its Hessian by the difference is where that of the copy would be.
 struct Tie {
   int rod, slot, copy;
-  int to_rod, vertex, of; ///< the other one's rod, number over all rods, and slot
+  int to_rod, vertex, of; ///< the other one's rod, number over all rods, and slot; of a body -1, -1 and the copy's slot
   int constraint;
+  bool isToBody() const { return vertex < 0; }
 };
 
 /// What junctions and ties add to the matrix of some rods.

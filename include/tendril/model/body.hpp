@@ -3,6 +3,7 @@
 /// Rigid bodies, their mass properties, and what ties rods to them.
 
 #include "tendril/geometry/mesh_distance.hpp"
+#include "tendril/model/motion.hpp"
 
 #include <memory>
 #include <string>
@@ -35,7 +36,8 @@ struct Body {
   std::string shape = "none"; ///< box, sphere, capsule, cylinder, mesh or none
   Vec3 size = Vec3::Zero();   ///< of a box its edges; else radius, length along z
   std::shared_ptr<const TriangleMesh> mesh;
-  int rod = 0; ///< the first that is tied to it, or any: they are solved together (Scene::hostBodies)
+  Motion motion; ///< of one that goes as it is told, about its origin
+  int rod = 0;   ///< the first that is tied to it, or any: they are solved together (Scene::hostBodies)
 };
 
 /// A vertex of a rod that is a point of a body. A weld ties the edges beside it to the frame of the body by half cells,
@@ -44,7 +46,7 @@ struct Attachment {
   std::string name;
   int rod, vertex, body;
   bool weld;
-  Frame frame; ///< of a weld at an end: where the rod leaves the body; length 1
+  Frame frame;                                        ///< of a weld at an end: where the rod leaves the body; length 1
   bool tangent_given = false, director_given = false; ///< by the scene, otherwise as drawn
 };
 

@@ -20,10 +20,18 @@ struct Motion {
   Vec3 velocity = Vec3::Zero();         ///< [m/s]
   Vec3 angular_velocity = Vec3::Zero(); ///< about the vertex [rad/s]
   std::vector<Key> table;               ///< in order of time; used instead of the velocities when not empty
+  Vec3 arm =
+      Vec3::Zero(); ///< from the point that is moved so and turned about, to the thing: it goes round with it [m]
 
   bool operator==(const Motion &) const = default;
   bool moves() const { return !table.empty() || !velocity.isZero(0) || !angular_velocity.isZero(0); }
-  Vec3 displacementAt(double time) const;
+  Vec3 displacementAt(double time) const; ///< of the thing
+  /// Of the same motion a point elsewhere.
+  Motion at(const Vec3 &arm_there) const {
+    Motion there = *this;
+    there.arm = arm_there;
+    return there;
+  }
   Vec3 velocityAt(double time) const;       ///< where it jumps, that before [m/s]
   Vec3 rotationVectorAt(double time) const; ///< [rad]
   Mat3 rotationAt(double time) const;

@@ -81,6 +81,7 @@ struct Constraint {
   std::string name;
   int rod, at;                      ///< vertex of a pin, edge of a rotation
   int to_rod = -1, to_vertex = -1;  ///< of a pin to another vertex, or -1
+  int to_body = -1;                 ///< or to a body: `point` and `frame` are those of the body as drawn
   Vec3 point;                       ///< of a pin to the world, without its motion [m]
   Frame frame;                      ///< of a rotation, without its motion; length 1
   Motion motion;                    ///< of the point, or of the frame
@@ -94,6 +95,8 @@ struct Constraint {
   bool isPin() const { return kind == Kind::pin; }
   /// A pin to another vertex: both are drawn to each other.
   bool isTie() const { return to_rod >= 0; }
+  bool isToBody() const { return to_body >= 0; }
+  bool isToWorld() const { return !isTie() && !isToBody(); }
   /// What rows of a trajectory and the rods' own memory need room for, in slots.
   int slots() const { return isPin() ? 1 : 3; }
   Vec3 pointAt(double time) const { return point + motion.displacementAt(time); }
@@ -132,7 +135,8 @@ struct Scene {
   std::vector<Support> supports;
   std::vector<Constraint> constraints;
   std::vector<Junction> junctions;
-  std::vector<Body> bodies;
+  std::vector<Body> bodies;      ///< that are free to move
+  std::vector<Body> held_bodies; ///< those at rest, or that move as they are told: what is tied to them, supports hold
   std::vector<Attachment> attachments;
   /// Gives every body its first rod, in the present order of rods.
   void hostBodies();

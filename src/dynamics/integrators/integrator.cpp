@@ -106,8 +106,8 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
         turned * all.inertia.ldlt().solve(turned.transpose() * (of_body.momentum - rate.spin.cross(rate.momentum)));
   }
   for (const JoinedVertex &j : joined) {
-    if (!j.isOnBody()) continue;
-    const int body = elements.bodyOf(j);
+    if (!j.isOnBody() || !j.isVertex()) continue;
+    const int body = j.body;
     const Vec3 arm = potential.dofs().arm(j), &spin = state.body_rate[body].spin;
     a.vertex[elements.rods[j.rod].first_vertex + j.vertex] =
         a.body[body].translation + a.body[body].spin.cross(arm) + spin.cross(spin.cross(arm));
