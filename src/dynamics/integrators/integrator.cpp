@@ -85,7 +85,8 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
   }
   std::map<int, double> mass; // of junctions, by the slots of their first members, which have all forces
   const auto joined = elements.joinedVertices(potential.all());
-  for (const JoinedVertex &j : joined) mass[j.first_slot] += j.isOnBody() ? 0 : elements.mass()[j.slot];
+  for (const JoinedVertex &j : joined)
+    if (!j.isOnBody()) mass[j.first_slot] += elements.mass()[j.slot];
   for (const JoinedVertex &j : joined) {
     const double whole = elements.freedom()[j.slot] * mass[j.first_slot],
                  damping = potential.scene().rods[j.rod].material.mass_damping_coefficient;
