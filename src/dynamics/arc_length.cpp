@@ -18,7 +18,8 @@ ArcLength::ArcLength(StepSolver &solver, const LoopSettings &settings)
       load_derivatives_(solver.potential().dofs().slots()) {
   const IncrementalPotential &potential = solver.potential();
   const Elements &e = potential.elements();
-  load_ = makeLoad(potential.scene(), e);
+  loads_.push_back(makeLoad(potential.scene(), e));
+  if (!potential.scene().bodies.empty()) loads_.push_back(makeBodyMotion(potential.scene(), e, false));
   for (const RodRange &rod : e.rods) {
     double length = 0;
     for (int s = rod.first_slot; s < rod.edgeEnd(); ++s) length += e.restLength()[s];
@@ -66,9 +67,10 @@ PetscErrorCode ArcLength::solveLoad(Planes *response) {
   const IncrementalPotential &potential = solver_.potential();
   load_derivatives_.equilibrium.clear();
   for (int r = 0; r < potential.all().end; ++r) {
-    load_->addDerivatives(potential.iterate(), r, load_derivatives_);
+    for (const auto &load : loads_) load->addDerivatives(potential.iterate(), r, load_derivatives_, HessianKind::none);
     potential.dofs().fold(potential.elements().rods[r], load_derivatives_.equilibrium);
   }
+  potential.dofs().foldJoined(potential.all(), load_derivatives_.equilibrium);
   PetscCall(solve(load_derivatives_.equilibrium, response));
   PetscFunctionReturn(0);
 }

@@ -18,9 +18,14 @@ void requireDeadLoads(const Scene &scene) {
       throw SceneError(
           "constraint '" + c.name +
           "' moves: -continuation arclength scales dead loads only; hold it still or use -continuation load");
-  const bool weight = !scene.gravity.isZero(0) &&
-                      std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &rod) { return rod.gravity; });
-  if (!weight && scene.rotation.angular_velocity.isZero(0) && scene.forces.empty() && scene.moments.empty())
+  const bool heavy = !scene.gravity.isZero(0),
+             weight =
+                 heavy && std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &r) { return r.gravity; }),
+             on_bodies = std::any_of(scene.bodies.begin(), scene.bodies.end(), [&](const Body &b) {
+               return (heavy && b.gravity) || !b.force.isZero(0) || !b.torque.isZero(0);
+             });
+  if (!weight && !on_bodies && scene.rotation.angular_velocity.isZero(0) && scene.forces.empty() &&
+      scene.moments.empty())
     throw SceneError("-continuation arclength needs a load to follow: gravity, a force, a torque or a moment");
 }
 
@@ -208,7 +213,8 @@ PetscErrorCode ArcLength::beginWalk(const State &state, Walk *walk) {
   IncrementalPotential &potential = solver_.potential();
   Step load;
   load.load_factor = 1;
-  for (int r = 0; r < potential.all().end; ++r) load_->beginStep(state, potential.iterate(), load, r);
+  for (int r = 0; r < potential.all().end; ++r)
+    for (const auto &of : loads_) of->beginStep(state, potential.iterate(), load, r);
   PetscCall(tangent(&walk->direction));
   rounding_ = 0;
   for (int r = 0; r < potential.all().end; ++r)

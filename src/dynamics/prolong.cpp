@@ -90,6 +90,13 @@ State prolonged(const State &state, const Scene &scene, const Elements &elements
       }
     }
   }
+  for (int b = 0; b < int(scene.bodies.size()); ++b) { // halves of edges weigh less at the bodies' vertices
+    const Mat3 turned = rotationOf(state, elements.body(b).group);
+    out.body_position.push_back(state.body_position[b] +
+                                turned * (fine_elements.bodyMass(b).centre - elements.bodyMass(b).centre));
+    out.body_position_low.push_back(state.body_position_low[b]);
+    out.body_rate.push_back({});
+  }
   out.position_low.assign(out.position.size(), Vec3::Zero());
   out.velocity.assign(out.position.size(), Vec3::Zero());
   out.twist_rate.assign(out.director.size(), 0.0);

@@ -303,7 +303,8 @@ void readWithFacts(const std::string &path, const Hdf5File &file, const Simulati
                    std::to_string(run.scene.rods.size()) + " with " + std::to_string(elements.vertices()) + " and " +
                    std::to_string(elements.edges()) +
                    "; restart with the scene that wrote the checkpoint, or one that only changes loads, supports, "
-                   "materials and options");
+                   "materials and options" +
+                   (run.scene.bodies.empty() ? "" : "; junctions, the masses of bodies and what is tied to them stay"));
   in.longText("facts", text);
   exchange(in, f->contents, elements);
   if (!in.finish()) f->lines.push_back(path + ": has no checksum: its data are taken as they are");

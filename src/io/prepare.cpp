@@ -179,7 +179,7 @@ static Scene sceneFor(Prepared &prepared, Options &o) {
   if (o.loop.dynamic && !file.scene.rotation.angular_velocity.isZero(0))
     throw SceneError("scene key 'rotation': is for -mode static, a scene at rest in a frame that turns; in dynamics "
                      "let supports turn by their motion");
-  if (o.bifurcation && o.loop.bifurcation != Bifurcation::off && !file.scene.moments.empty())
+  if (o.bifurcation && o.loop.bifurcation != Bifurcation::off && file.scene.hasCouples())
     throw SceneError(
         "option -bifurcation: a scene with couples has no potential whose Hessian could tell stability; use off");
   if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength) requireDeadLoads(file.scene);
@@ -191,9 +191,8 @@ static Scene sceneFor(Prepared &prepared, Options &o) {
           "length; take a clamp, or compare runs with -rod_edges");
   if (!file.scene.colliders.empty()) refuseWithObstacles(o);
   if (o.accuracy && file.scene.isJoined())
-    throw SceneError(
-        "option -accuracy: chooses the edges of each rod by itself, and is not for rods that 'junctions' or "
-        "'constraints' join yet; compare runs with -rod_edges, or take -error_estimate");
+    throw SceneError("option -accuracy: chooses the edges of each rod by itself, and is not for rods that 'junctions', "
+                     "'bodies' or 'constraints' join yet; compare runs with -rod_edges, or take -error_estimate");
   if (o.accuracy && o.accuracy->of == Quantity::tip)
     for (const Rod &rod : file.scene.rods)
       if (rod.closed)

@@ -30,6 +30,16 @@ void Recorder::writeFrame(const State &whole) {
   if (!leads()) return;
   trajectory_->writeFrame(whole);
   widest_.include(run_.scene, *run_.elements, whole);
+  noteSpins(whole);
+}
+
+/// The body that turns farthest in a step.
+void Recorder::noteSpins(const State &whole) {
+  for (int b = 0; b < int(whole.body_rate.size()) && options_.loop.dynamic; ++b) {
+    const double dt = last_.dt > 0 ? last_.dt : options_.loop.dt,
+                 turn = dt * whole.body_rate[std::size_t(b)].spin.norm();
+    if (turn > fastest_.turn) fastest_ = {turn, b, whole.time, dt};
+  }
 }
 
 PetscErrorCode Recorder::observe(const State &state, const Diagnostics &row) {
@@ -193,6 +203,13 @@ std::string Recorder::tellGrowth(bool finished) {
 }
 
 void Recorder::tellAccuracy() {
+  if (fastest_.body >= 0) {
+    std::ostringstream line;
+    line << "warning: body '" << run_.scene.bodies[std::size_t(fastest_.body)].name << "' turned by "
+         << std::setprecision(3) << fastest_.turn << " rad in a step, at time " << fastest_.time
+         << ": its way is far off; take a -dt below " << 0.3 * fastest_.dt / fastest_.turn;
+    progress_.say(line.str());
+  }
   if (widest_.rod >= 0) {
     std::ostringstream line;
     line << "warning: neighbouring edges of rod '" << run_.scene.rods[std::size_t(widest_.rod)].name

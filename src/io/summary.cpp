@@ -42,6 +42,10 @@ Summary summarize(const Scene &scene, const Elements &elements, const State &sta
       out.compression.include(-along, int(r), i);
     }
   }
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) { // with the vertices that are tied to them
+    out.mass += elements.bodyMass(int(b)).mass;
+    out.centre_of_mass += elements.bodyMass(int(b)).mass * state.body_position[b];
+  }
   out.centre_of_mass /= out.mass;
   WidestAngle widest{0};
   widest.every_measure = true;

@@ -69,6 +69,18 @@ std::string nearObstacle(const IncrementalPotential &potential, RodSet rods) {
   return hint.str();
 }
 
+std::string fastBody(const IncrementalPotential &potential, RodSet rods) {
+  std::ostringstream hint;
+  for (const JoinedBody &b : potential.elements().bodies(rods)) {
+    const double turned = potential.iterate().positionAt(b.rotation).norm();
+    if (!(turned > 1)) continue;
+    hint << std::setprecision(3) << "; body '" << potential.scene().bodies[b.body].name << "' is turned by " << turned
+         << " rad in it, too far for one step: take shorter ones";
+    break;
+  }
+  return hint.str();
+}
+
 /// Words on the rod of the energy `seed` that bends most sharply, more than `sharpest`, with its edges shorter than
 /// `longest`: without axial force its stretch r obeys r^2 = 1 - 2 B kappa^2/EA, with kappa the turning per reference
 /// length, and the moment B r^2 kappa is largest where B kappa^2 = EA/6, the unit of the sharpness, and r^2 = 2/3.

@@ -32,7 +32,8 @@ private:
   };
   StepSolver &solver_;
   LoopSettings settings_;
-  std::unique_ptr<Term> load_; ///< at load factor 1: its gradient is the derivative of the gradient by the load factor
+  std::vector<std::unique_ptr<Term>>
+      loads_; ///< at load factor 1: their gradient is the derivative of the gradient by the load factor
   Planes metric_;
   Derivatives load_derivatives_;
   Point last_; ///< the last step taken

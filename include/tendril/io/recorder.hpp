@@ -52,11 +52,17 @@ private:
   long steps_ = 0, iterations_ = 0, rejected_ = 0;
   bool told_unstable_ = false;
   WidestAngle widest_;
+  struct {
+    double turn = 1; ///< in a step, from which on it is told [rad]
+    int body = -1;
+    double time = 0, dt = 0; ///< [s]
+  } fastest_;
   double dissipated_ = 0, gained_ = 0, work_ = 0, work_of_obstacles_ = 0; ///< [J]
   double most_kinetic_ = 0, first_stored_ = NAN, most_stored_ = 0;        ///< [J]
 
   bool leads() const { return prepared_.team.leads(); }
   void writeFrame(const State &whole);
+  void noteSpins(const State &whole);
   void tellInstability(const Diagnostics &row);
 };
 

@@ -14,6 +14,9 @@ std::string nearBarrier(const IncrementalPotential &potential, RodSet rods);
 /// On the first rod that is pressed hard against an obstacle.
 std::string nearObstacle(const IncrementalPotential &potential, RodSet rods);
 
+/// On the first body that turns by more than a radian in the step.
+std::string fastBody(const IncrementalPotential &potential, RodSet rods);
+
 /// Words on a rod of the energy `seed` that is near a limit of its law, or beyond: of bending, more sharply than
 /// `sharpest` (in units of the limit) with edges shorter than `longest`, or of compression with an edge shorter than
 /// `shortest`; the force is largest, EA r (1 - r^2)/2 = 0.192 EA, where the stretch r obeys r^2 = 1/3.
