@@ -304,7 +304,7 @@ def wrong_input(folder):
     message(lambda: t.rods[0].field("speed"), "'speed'", "velocity")
     message(lambda: t.rods[0].position(5), "no frame 5", "there are 5")
     message(lambda: t.field("position")[-6], "no frame -6")
-    message(lambda: t.unit("speed"), "'speed'", "velocity", "gravity")
+    message(lambda: t.unit("speed"), "'speed'", "velocity", "bend")
     message(lambda: t.rods[0].reference("speed"), "'speed'", "position")
     message(lambda: Trajectory(folder + "/nowhere"), "nowhere", "no such file")
     message(lambda: Trajectory(folder), folder + "/trajectory.h5", "no such file")
