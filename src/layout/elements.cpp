@@ -239,9 +239,6 @@ void Elements::weighBodies(const Scene &scene) {
     if (j.isOnBody())
       arm_[j.number] = (j.isVertex() ? scene.rods[j.rod].position[j.vertex] : scene.constraints[j.attachment].point) -
                        body_mass_[j.body].centre;
-  for (const JoinedEdge &j : joined_edges_.items) // that springs turn to bodies: their frames are those of the springs
-    for (int k = 0; k < int(scene.constraints.size()) && j.vertex < 0; ++k)
-      if (constraint_slot[k] == j.frame) joined_frame_[&j - joined_edges_.items.data()] = scene.constraints[k].frame;
 }
 
 /// Slots behind those of supports along a rod.
@@ -256,7 +253,9 @@ void Elements::placeConstraints(const Scene &scene, std::vector<int> free_slots)
       const auto edges = joinedEdges({c.rod, c.rod + 1});
       auto isNext = [n = to_bodies[c.rod]](const JoinedEdge &j) mutable { return j.vertex < 0 && n-- == 0; };
       ++to_bodies[c.rod];
-      constraint_slot.push_back(std::find_if(edges.begin(), edges.end(), isNext)->frame);
+      const JoinedEdge &j = *std::find_if(edges.begin(), edges.end(), isNext);
+      constraint_slot.push_back(j.frame);
+      joined_frame_[&j - joined_edges_.items.data()] = c.frame;
       continue;
     }
     if (!c.isToWorld()) {
