@@ -75,8 +75,7 @@ constexpr ShapeKey shape_keys[] = {
 /// By which constraints may find it without doubt.
 std::string readBodyName(YamlMap &map, const SceneFile &file) {
   const bool given = map.has("bodies[].name");
-  const std::string name =
-      given ? readName(map.at("bodies[].name")) : "body" + std::to_string(file.scene.bodies.size());
+  const std::string name = given ? readName(map.at("bodies[].name")) : "body" + std::to_string(file.bodies.size());
   if (given && name.find_first_not_of("0123456789") == std::string::npos)
     map.at("bodies[].name").fail("'name' must not be a number, by which bodies are counted, found '" + name + "'");
   if (file.body_numbers.count(name))

@@ -302,6 +302,23 @@ TEST(SceneReader, EndsWhereYamlWouldNot) {
             2u);
 }
 
+/// Bodies without names are counted as they stand in the file; what is tied to one that stays, supports hold.
+TEST(SceneReader, BodiesAreFreeOrHeld) {
+  const std::string ball = "sphere: {radius: 0.1}, density: 10";
+  const Scene scene = read("rods: [{" + line + "}]\nbodies: [{" + ball + ", fixed: true}, {" + ball +
+                           "}]\nconstraints: [{type: weld, vertex: 0, body: 0}, {type: pin, vertex: 4, body: body1}]\n")
+                          .scene;
+  ASSERT_EQ(scene.held_bodies.size(), 1u);
+  ASSERT_EQ(scene.bodies.size(), 1u);
+  EXPECT_EQ(scene.held_bodies[0].name, "body0");
+  EXPECT_EQ(scene.bodies[0].name, "body1");
+  ASSERT_EQ(scene.supports.size(), 1u);
+  EXPECT_EQ(scene.supports[0].kind, Support::Kind::clamp);
+  ASSERT_EQ(scene.attachments.size(), 1u);
+  EXPECT_FALSE(scene.attachments[0].weld);
+  EXPECT_EQ(scene.attachments[0].vertex, 4);
+}
+
 TEST(SceneReader, ReadsTextOnly) {
   EXPECT_EQ(read("\xEF\xBB\xBFrods: [{name: \xC3\xA9, " + line + "}]").scene.rods[0].name,
             "\xC3\xA9"); // behind a byte order mark
