@@ -20,9 +20,10 @@ import numpy as np
 
 FORMATS = (1, 2)
 PLACES = ("vertices", "edges", "cells")
-ROWS = ("supports", "constraints", "colliders", "bodies")  # of fields that are not of rods
+ROWS = ("supports", "constraints", "colliders", "bodies", "joints")  # of fields that are not of rods
 ON_DEMAND = ("curvature", "twist", "strain_energy_density", "force", "moment", "reaction", "reaction_moment",
-             "constraint_deviation", "constraint_force", "contact_force", "collider_force", "collider_moment", "position_low")
+             "constraint_deviation", "constraint_force", "contact_force", "collider_force", "collider_moment",
+             "joint_coordinate", "joint_distance", "joint_force", "joint_moment", "position_low")
 
 # Place and unit of what is in files of format 1; later ones tell by themselves.
 FORMAT_1_FIELDS = {
@@ -101,7 +102,7 @@ def _open(path):
 
 
 class Field:
-    """A field of all rods, at `place`: vertices, edges, cells, supports, constraints, colliders or bodies; indices read
+    """A field of all rods, at `place`: vertices, edges, cells, supports, constraints, colliders, bodies or joints; indices read
     from the file what they ask for.
 
     field[frame], field[first:last, vertex], numpy.asarray(field). Shape: (frames, n), or (frames, n, components).
@@ -261,6 +262,19 @@ class Attachment:
     vertex: int
 
 
+@dataclass(frozen=True)
+class Joint:
+    """Between a body, `child`, and another, `parent`: None for the world, or a body that goes as it is told. point (3,)
+    [m] and axis (3,) as drawn."""
+
+    name: str
+    type: str
+    child: str
+    parent: str | None
+    point: np.ndarray
+    axis: np.ndarray
+
+
 class Things(list):
     """Bodies or colliders by number or name."""
 
@@ -415,7 +429,7 @@ class Trajectory:
     """A trajectory.h5, given by its path or that of its folder.
 
     path, format_version, attributes (those of the file: command line, version, ...), gravity (3,) [m/s^2];
-    rods, supports, constraints, bodies, attachments, colliders; scene: its text, or None; scene_files: texts that it
+    rods, supports, constraints, bodies, attachments, joints, colliders; scene: its text, or None; scene_files: texts that it
     names, by path as written; options: Options. A frame counts once it is complete. What a run has added since is seen
     after refresh().
     """
@@ -489,6 +503,12 @@ class Trajectory:
                 rod = int(np.searchsorted(starts, vertex, side="right")) - 1
                 self.attachments.append(Attachment(name, kind, bodies[body], self._static["name"][rod],
                                                    vertex - starts[rod], vertex))
+        self.joints = []
+        if "joints" in f:
+            bodies = _texts(f["bodies/name"])
+            columns = (f["joints/" + n][:] for n in ("child", "parent", "point", "axis"))
+            for name, kind, child, parent, *place in zip(*(_texts(f["joints/" + n]) for n in ("name", "type")), *columns):
+                self.joints.append(Joint(name, kind, bodies[child], bodies[parent] if parent >= 0 else None, *place))
         self.scene = _text(f["scene"][()]) if "scene" in f else None
         files = f["scene_files"].values() if "scene_files" in f else ()
         self.scene_files = {_text(data.attrs["path"]): _text(data[()]) for data in files}
@@ -629,7 +649,7 @@ class Trajectory:
         except ImportError:
             raise TendrilError("to_xarray needs xarray: apt-get install python3-xarray") from None
         dimension = {"vertices": "vertex", "edges": "edge", "cells": "cell", "supports": "support",
-                     "constraints": "constraint", "colliders": "collider", "bodies": "body"}
+                     "constraints": "constraint", "colliders": "collider", "bodies": "body", "joints": "joint"}
         variables = {}
         for name in self._fields:
             field = self.field(name)

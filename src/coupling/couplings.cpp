@@ -4,8 +4,8 @@ namespace tendril {
 namespace {
 
 /// All couplings. A new one needs its line here and nothing else.
-constexpr std::unique_ptr<Term> (*couplings[])(const Scene &, const Elements &) = {makePins, makeTies, makeRotations,
-                                                                                   makeRotationsToBodies, makeContact};
+constexpr std::unique_ptr<Term> (*couplings[])(const Scene &, const Elements &) = {
+    makePins, makeTies, makeRotations, makeRotationsToBodies, makeJoints, makeBodyContact, makeContact};
 
 } // namespace
 

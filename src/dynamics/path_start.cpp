@@ -18,6 +18,11 @@ void requireDeadLoads(const Scene &scene) {
       throw SceneError(
           "constraint '" + c.name +
           "' moves: -continuation arclength scales dead loads only; hold it still or use -continuation load");
+  for (const Joint &j : scene.joints)
+    if (j.motion.moves() || j.target_motion.moves())
+      throw SceneError("joint '" + j.name +
+                       "' is moved, by its parent or its drive: -continuation arclength scales dead loads only; hold "
+                       "it still or use -continuation load");
   const bool heavy = !scene.gravity.isZero(0),
              weight =
                  heavy && std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &r) { return r.gravity; }),

@@ -21,6 +21,7 @@ Slice::Slice(const Scene &whole, const Partition &partition, const Team &team) :
     parts_[rank_of[b.rod]].bodies.push_back(bodies_++);
     parts_[rank_of[b.rod]].groups.push_back(groups_++);
   }
+  for (const Joint &j : whole.joints) parts_[rank_of[j.rod]].joints.push_back(joints_++);
   for (const Holder &h : movingHolders(whole)) parts_[rank_of[h.rod]].holders.push_back(holders_++);
   std::vector<std::vector<int>> of_rod(whole.rods.size());
   for (const Holder &h : movingObstacles(whole)) of_rod[h.rod].push_back(holders_++);
@@ -113,6 +114,7 @@ public:
     for (auto array : {&State::body_position, &State::body_position_low})
       move(mine.*array, of(array), &Part::bodies, one, std::size_t(slice_.bodies_));
     move(mine.body_rate, of(&State::body_rate), &Part::bodies, one, std::size_t(slice_.bodies_));
+    move(mine.joints, of(&State::joints), &Part::joints, one, std::size_t(slice_.joints_));
     moveStrains(own, mine, all);
     moveActions(mine, all);
     if (!mine.contact_stiffness.empty())

@@ -64,7 +64,7 @@ public:
       const Vec3 momentum = turned.transpose() * rate.momentum;
       if (dynamic_)
         out.body_kinetic +=
-            0.5 * (all.mass * rate.translation.squaredNorm() + momentum.dot(all.inertia.ldlt().solve(momentum)));
+            0.5 * (all.mass * rate.translation.squaredNorm() + momentum.dot(elements_.spinOf(b.body, momentum)));
       out.gravity -= load_factor * weightOf(b.body).dot(state.body_position[b.body]);
     }
   }

@@ -1,4 +1,5 @@
 #include "tendril/energy/cell.hpp"
+#include "tendril/energy/joint.hpp"
 
 #include "tendril/energy/constraint.hpp"
 
@@ -19,6 +20,11 @@ std::vector<double> strainsOf(const Scene &scene, const Elements &elements, cons
     const Mat3 m = dampedStrain(elements, constraint, slot, elements.length(constraint.rod), c);
     for (int j = 0; j < constraint.slots(); ++j)
       for (int k = 0; k < 3; ++k) strains[(k + 1) * row + slot + j] = m(k, j);
+  }
+  for (std::size_t n = 0; n < scene.joints.size(); ++n) {
+    const BodyPair &pair = elements.pairOf(int(n));
+    const Rows rows = dampedRows(scene.joints[n], placeOf(scene.joints[n], pair, elements, c));
+    for (int k = 0; k < joint_rows; ++k) strains[std::size_t(pair.first + k)] = rows[k];
   }
   return strains;
 }

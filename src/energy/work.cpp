@@ -24,7 +24,13 @@ HolderActions staticActions(const Scene &scene, const Elements &elements, const 
   const RodActions actions = rodActions(scene, elements, state, state.time, state.time, false);
   HolderActions out;
   for (const Holder &h : moving)
-    if (h.support)
+    if (h.joint) {
+      const JointReading &of = actions.joint[h.index];
+      if (h.drives)
+        out.insert(out.end(), {Vec3(of.drive, 0, 0), Vec3::Zero()});
+      else
+        out.insert(out.end(), {of.force, of.moment});
+    } else if (h.support)
       out.insert(out.end(), {actions.reaction[h.index], actions.reaction_moment[h.index]});
     else
       out.insert(out.end(), {actions.constraint[h.index].force, actions.constraint[h.index].moment});
@@ -86,15 +92,22 @@ std::vector<Holder> movingHolders(const Scene &scene) {
     if (s.motion.moves()) moving.push_back({s.rod, &s.motion, int(&s - scene.supports.data()), &s});
   for (const Constraint &c : scene.constraints)
     if (c.motion.moves()) moving.push_back({c.rod, &c.motion, int(&c - scene.constraints.data()), nullptr, &c});
+  for (const Joint &j : scene.joints)
+    for (const bool drives : {false, true})
+      if (const Motion &motion = drives ? j.target_motion : j.motion; motion.moves())
+        moving.push_back({j.rod, &motion, int(&j - scene.joints.data()), nullptr, nullptr, nullptr, &j, drives});
   return moving;
 }
 
 std::vector<Holder> movingObstacles(const Scene &scene) {
   std::vector<Holder> moving;
   if (!scene.collidersMove()) return moving;
+  std::vector<char> holds(scene.rods.size(), false); // a body that touches
+  for (const Body &b : scene.bodies)
+    if (b.contact.on) holds[b.rod] = true;
   for (int r = 0; r < int(scene.rods.size()); ++r)
     for (const Collider &c : scene.colliders)
-      if (scene.touches(r) && c.motion.moves())
+      if ((scene.touches(r) || holds[r]) && c.motion.moves())
         moving.push_back({r, &c.motion, int(&c - scene.colliders.data()), nullptr, nullptr, &c});
   return moving;
 }

@@ -246,7 +246,36 @@ Frame readFrame(YamlMap &map, const Rod &rod, int vertex) {
 
 } // namespace
 
-void readBody(const YamlValue &value, SceneFile &out) {
+/// How a body touches obstacles.
+static void readContact(YamlMap &map, const ContactSettings &of_scene, Body &body) {
+  ContactSettings &contact = body.contact;
+  contact.on = body.shape != "none";
+  contact.friction = of_scene.friction;
+  contact.fall_off_velocity = of_scene.fall_off_velocity;
+  contact.tangential_damping = of_scene.tangential_damping;
+  contact.normal_damping = of_scene.normal_damping;
+  contact.distance = 0.02 * std::sqrt(body.own.inertia.trace() / body.own.mass);
+  if (!map.has("bodies[].contact")) return;
+  const YamlValue value = map.at("bodies[].contact");
+  if (!contact.on) value.fail("a body without a shape (" + std::string(shape_names) + ") touches nothing; give it one");
+  if (!value.isMap()) {
+    contact.on = map.word("bodies[].contact") != "none";
+    return;
+  }
+  YamlMap block(value, "bodies[].contact");
+  auto read = [&](KeyOf<KeyType::number> key, double &to) {
+    if (block.has(*key)) to = block.number(key);
+  };
+  read("bodies[].contact.distance", contact.distance);
+  read("bodies[].contact.stiffness", contact.stiffness);
+  read("bodies[].contact.friction", contact.friction);
+  read("bodies[].contact.fall_off_velocity", contact.fall_off_velocity);
+  read("bodies[].contact.tangential_damping", contact.tangential_damping);
+  read("bodies[].contact.normal_damping", contact.normal_damping);
+  block.finish();
+}
+
+void readBody(const YamlValue &value, const ContactSettings &contact, SceneFile &out) {
   YamlMap map(value, "bodies");
   Body body;
   body.name = readBodyName(map, out);
@@ -273,6 +302,7 @@ void readBody(const YamlValue &value, SceneFile &out) {
   body.gravity = map.flag("bodies[].gravity");
   body.force = map.vector("bodies[].force");
   body.torque = map.vector("bodies[].torque");
+  readContact(map, contact, body);
   const bool held = map.flag("bodies[].fixed") || map.has("bodies[].motion");
   if (map.has("bodies[].motion")) {
     const YamlValue motion = map.at("bodies[].motion");

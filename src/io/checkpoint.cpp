@@ -115,6 +115,10 @@ template <class Archive, class AnyContents> void exchange(Archive &a, AnyContent
   a.array("body_position_low", s.body_position_low, bodies);
   a.array("body_rate", s.body_rate, bodies);
   for (std::size_t n = 0; n < memory; ++n) a.array("memory_body_" + std::to_string(n), s.memory[n].body, bodies);
+  if (a.format_version < 8) return;
+  std::size_t joints = s.joints.size();
+  whole("joints", joints, 1e15);
+  a.array("joints", s.joints, joints);
 }
 
 /// Whole turns of cells that were others in the checkpoint: the twist of a vertex along the rod stays what it was, by
@@ -335,6 +339,7 @@ void adapt(Found *f, const std::vector<double> &places, const Simulation &run, c
   if (s.contacts.size() != rods) s.contacts.clear();
   s.junction_axes.resize(run.elements->groups, {Vec3::UnitX(), Vec3::UnitY()});
   for (Rates &rates : s.memory) rates.body.resize(run.scene.bodies.size());
+  s.joints.resize(run.scene.joints.size());
   if (!f->same_method) {
     s.memory.clear();
     s.strains.clear();

@@ -53,6 +53,10 @@ const char *typeName(KeyType type) {
     return "name, number or all";
   case KeyType::rows:
     return "rows of numbers";
+  case KeyType::range:
+    return "two numbers";
+  case KeyType::profile:
+    return "rows of two numbers";
   case KeyType::list:
     return "list";
   case KeyType::map:
@@ -150,7 +154,8 @@ std::string rulesOf(std::string_view block) {
  "if": {"anyOf": [{"required": ["motion"]}, {"required": ["fixed"], "properties": {"fixed": {"const": true}}}]},
  "then": {"not": {"anyOf": [{"required": ["velocity"]}, {"required": ["angular_velocity"]}, {"required": ["force"]}, {"required": ["torque"]},
   {"required": ["fixed", "motion"], "properties": {"fixed": {"const": true}}}]}})";
-  if (block == "supports[].motion" || block == "constraints[].motion" || block == "colliders[].motion" || block == "bodies[].motion")
+  if (block == "supports[].motion" || block == "constraints[].motion" || block == "colliders[].motion" ||
+      block == "bodies[].motion")
     return R"("oneOf": [{"required": ["table"]}, {"anyOf": [{"required": ["velocity"]}, {"required": ["angular_velocity"]}]}])";
   if (block == "contact")
     return R"("if": {"required": ["radius"], "properties": {"radius": {"const": 0}}},
@@ -199,6 +204,10 @@ std::string valueSchema(const Key &key) {
     return R"("type": "array", "items": {"type": "number"}, "anyOf": [{"minItems": 3, "maxItems": 3}, {"minItems": 6, "maxItems": 6}])";
   case KeyType::index:
     return "\"anyOf\": [{\"type\": \"integer\", \"minimum\": 0}, {\"const\": \"last\"}]";
+  case KeyType::range:
+    return R"("type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2)";
+  case KeyType::profile:
+    return R"("type": "array", "minItems": 1, "items": {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2})";
   case KeyType::rows:
     return R"("type": "array", "minItems": 1, "items": {"type": "array", "items": {"type": "number"},
  "oneOf": [{"minItems": 4, "maxItems": 4}, {"minItems": 7, "maxItems": 7}]})";

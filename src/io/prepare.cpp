@@ -26,6 +26,8 @@ void requireHeld(const Scene &scene) {
     if (c.isPin() && !c.isToWorld() && c.stiffness > 0)
       first[rootOf(c.rod)] = rootOf(c.isTie() ? c.to_rod : scene.bodies[c.to_body].rod);
   for (const Attachment &a : scene.attachments) first[rootOf(a.rod)] = rootOf(scene.bodies[a.body].rod);
+  for (const Joint &j : scene.joints)
+    if (j.parent >= 0) first[rootOf(j.rod)] = rootOf(scene.bodies[j.parent].rod);
   std::vector<char> held(scene.rods.size(), false);
   for (const Support &s : scene.supports)
     if (s.holdsPosition()) held[rootOf(s.rod)] = true;
@@ -33,16 +35,21 @@ void requireHeld(const Scene &scene) {
     if (c.isPin() && c.isToWorld() && c.stiffness > 0) held[rootOf(c.rod)] = true;
   for (int r = 0; r < int(scene.rods.size()); ++r)
     if (scene.touches(r)) held[rootOf(r)] = true; // what obstacles hold shows
+  for (int b = 0; b < int(scene.bodies.size()); ++b)
+    if (scene.touchesBody(b)) held[rootOf(scene.bodies[b].rod)] = true;
   std::vector<char> tied(scene.bodies.size(), false);
   for (const Attachment &a : scene.attachments) tied[a.body] = true;
   for (const Constraint &c : scene.constraints)
     if (c.isToBody() && c.isPin() && c.stiffness > 0) tied[c.to_body] = true;
-  for (std::size_t b = 0; b < tied.size(); ++b)
-    if (!tied[b])
+  for (const Joint &j : scene.joints) tied[j.child] = true;
+  for (const Joint &j : scene.joints)
+    if (j.parent >= 0) tied[j.parent] = true;
+  for (int b = 0; b < int(tied.size()); ++b)
+    if (!tied[b] && !scene.touchesBody(b))
       throw SceneError(
           "body '" + scene.bodies[b].name +
           "' is free to move: -mode static needs a weld or pin, exact or with a stiffness, that ties it to "
-          "a rod, or write 'fixed: true'");
+          "a rod, or a joint, or write 'fixed: true'");
   for (int r = 0; r < int(scene.rods.size()); ++r)
     if (!held[rootOf(r)])
       throw SceneError("rod '" + scene.rods[r].name +
@@ -55,6 +62,12 @@ void requireHeld(const Scene &scene) {
 void refuseOverlaps(const Simulation &run) {
   const Scene &scene = run.scene;
   const Configuration drawn = configurationOf(run.state, scene, *run.elements, run.state.time);
+  for (const Touch &o : tightestOfBodies(scene, *run.elements, drawn))
+    if (const Body &body = scene.bodies[std::size_t(o.rod)]; o.gap < -0.45 * body.contact.distance)
+      throw SceneError("body '" + body.name + "' is drawn " + shortText(-o.gap) + " m deep in collider '" +
+                       scene.colliders[std::size_t(o.collider)].name +
+                       "'; move one of them, or write 'contact: none' "
+                       "in the block of the body");
   for (const Touch &o : tightest(scene, *run.elements, drawn)) {
     const ContactSettings &contact = scene.rods[o.rod].contact;
     const double wall = contact.wall(*scene.colliders[o.collider].shape);
@@ -76,10 +89,12 @@ namespace {
 std::vector<std::string> notesOnContact(const Simulation &run) {
   constexpr double longest = 20; // radii
   std::vector<std::string> notes;
+  auto slides = [](const Body &b) { return b.contact.on && b.contact.slides(); };
   for (const Collider &c : run.scene.colliders)
-    if (c.friction > 0 && !run.scene.slides())
-      notes.push_back("warning: collider '" + c.name + "' has the friction " + shortText(c.friction) +
-                      " and no rod has any: of both the geometric mean counts; write 'contact: {friction: ...}', too");
+    if (c.friction > 0 && !run.scene.slides() && std::none_of(run.scene.bodies.begin(), run.scene.bodies.end(), slides))
+      notes.push_back(
+          "warning: collider '" + c.name + "' has the friction " + shortText(c.friction) +
+          " and no rod or body has any: of both the geometric mean counts; write 'contact: {friction: ...}', too");
   for (int r = 0; r < int(run.scene.rods.size()); ++r) {
     const ContactSettings &contact = run.scene.rods[r].contact;
     if (!run.scene.touches(r) || contact.radius == 0) continue;
@@ -109,6 +124,31 @@ void refuseWithObstacles(const Options &o) {
   const std::string option = arc ? "-continuation arclength" : o.accuracy ? "-accuracy" : "-error_estimate";
   throw SceneError("option " + option + ": is not for scenes with 'colliders' yet; " +
                    (arc ? "take load steps" : "compare runs with -rod_edges, and with other values of -dt"));
+}
+
+/// Friction of bodies is taken anew with every step, and in statics nothing would hold it.
+void refuseFrictionOfBodies(const Scene &scene, const Options &o) {
+  for (int b = 0; b < int(scene.bodies.size()); ++b)
+    if (!o.loop.dynamic && scene.touchesBody(b) && scene.bodies[b].contact.friction > 0)
+      throw SceneError("body '" + scene.bodies[b].name +
+                       "' has friction with colliders, which acts on bodies in steps of time only; write 'contact: "
+                       "{friction: 0}' in its block, or take -mode dynamic");
+}
+
+/// Methods whose stages do not end with their steps hold joints exactly in the middle only, whose forces swing then.
+void refuseWithJoints(const Scene &scene, Options &o, std::vector<std::string> *notes) {
+  const std::string &name = o.loop.integrator.name;
+  const auto exact = std::find_if(scene.joints.begin(), scene.joints.end(), [](const Joint &j) {
+    return j.isExact() || (j.driven && j.drive_stiffness < 0) || (j.hasRange() && j.range_stiffness < 0);
+  });
+  if (!o.loop.dynamic || exact == scene.joints.end()) return;
+  if (name == "midpoint" || name == "symplectic2" || name == "energy_momentum")
+    throw SceneError("option -integrator " + name + ": holds joint '" + exact->name +
+                     "', which is exact, in the middle of steps only; take bdf2 or generalized_alpha, or give the "
+                     "joint (its drive, its range) a stiffness");
+  if (name.rfind("sdirk", 0) == 0)
+    notes->push_back("warning: -integrator " + name + " is of first order with exact joints, as '" + exact->name +
+                     "'; bdf2 and generalized_alpha keep their second order");
 }
 
 /// What PETSc finds wrong is a mistake in the options of its solvers.
@@ -190,6 +230,8 @@ static Scene sceneFor(Prepared &prepared, Options &o) {
           "' turns an edge, whose middle moves when edges change: errors do not fall with the square of their "
           "length; take a clamp, or compare runs with -rod_edges");
   if (!file.scene.colliders.empty()) refuseWithObstacles(o);
+  refuseWithJoints(file.scene, o, &prepared.notes);
+  refuseFrictionOfBodies(file.scene, o);
   if (o.accuracy && file.scene.isJoined())
     throw SceneError("option -accuracy: chooses the edges of each rod by itself, and is not for rods that 'junctions', "
                      "'bodies' or 'constraints' join yet; compare runs with -rod_edges, or take -error_estimate");

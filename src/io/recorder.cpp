@@ -162,9 +162,9 @@ double smallEnergy(const Simulation &run) {
   return little;
 }
 
-/// The rod of the largest kinetic energy.
-std::size_t liveliest(const Simulation &run) {
-  std::size_t most = 0;
+/// The rod or body of the largest kinetic energy.
+std::string liveliest(const Simulation &run) {
+  std::string most;
   double largest = -1;
   for (std::size_t r = 0; r < run.elements->rods.size(); ++r) {
     const RodRange &rod = run.elements->rods[r];
@@ -172,7 +172,13 @@ std::size_t liveliest(const Simulation &run) {
     for (int i = 0; i < rod.vertices; ++i)
       energy +=
           0.5 * run.elements->mass()[rod.slot(i)] * run.state.velocity[std::size_t(rod.first_vertex + i)].squaredNorm();
-    if (energy > largest) largest = energy, most = r;
+    if (energy > largest) largest = energy, most = labelOf(run.scene.rods[r]);
+  }
+  for (std::size_t b = 0; b < run.scene.bodies.size(); ++b) {
+    const BodyRate &rate = run.state.body_rate[b];
+    const double energy = 0.5 * (run.elements->bodyMass(int(b)).mass * rate.translation.squaredNorm() +
+                                 rate.spin.dot(rate.momentum));
+    if (energy > largest) largest = energy, most = "body '" + run.scene.bodies[b].name + "'";
   }
   return most;
 }
@@ -186,7 +192,9 @@ std::string Recorder::tellGrowth(bool finished) {
                little = smallEnergy(run_);
   if (!options_.loop.dynamic || !(gained_ > told * moved + little)) return {};
   const std::string &method = options_.loop.integrator.name;
-  std::string remedy = "or take bdf2 or energy_momentum";
+  std::string remedy = !run_.scene.joints.empty() ? "or take generalized_alpha or euler"
+                       : method == "bdf2"         ? "or take energy_momentum or euler"
+                                                  : "or take bdf2 or energy_momentum";
   if (!run_.scene.colliders.empty())
     remedy = std::string("give the impacts 'contact: {normal_damping: ...}', ") +
              (method == "euler" ? "or fix 'contact: {stiffness: ...}'" : "or take euler");
@@ -194,8 +202,7 @@ std::string Recorder::tellGrowth(bool finished) {
   growth << "the energy rose by " << std::setprecision(2) << gained_ / moved << " of the largest kinetic energy"
          << (work > 0 ? " and the work done on it" : "") << " (at most " << passes
          << " passes), with nothing to put it in but -integrator " << method
-         << " in steps too long for it: shorten -dt, " << remedy << "; " << labelOf(run_.scene.rods[liveliest(run_)])
-         << " moves most";
+         << " in steps too long for it: shorten -dt, " << remedy << "; " << liveliest(run_) << " moves most";
   // A method that is unstable has made most of the motion itself.
   if (finished && gained_ > passes * moved + little) return growth.str();
   progress_.say("warning: " + growth.str());

@@ -62,6 +62,20 @@ std::string textOf(const Constraint &c, const Scene &scene) {
   return text + textOf(c.motion);
 }
 
+std::string textOf(const Joint &j) {
+  std::string text(nameOf(j.type));
+  for (const auto &[name, value] :
+       {std::pair(", stiffness ", j.stiffness), std::pair(", rotational stiffness ", j.rotational_stiffness),
+        std::pair(", damping ", j.damping), std::pair(", rotational damping ", j.rotational_damping),
+        std::pair(", saturation ", j.saturation), std::pair(", range stiffness ", j.range_stiffness)})
+    text += name + textOf(value);
+  text += ", range " + textOf(j.lower) + " to " + textOf(j.upper);
+  if (j.driven)
+    text += ", drive to " + textOf(j.target) + " of stiffness " + textOf(j.drive_stiffness) + " and damping " +
+            textOf(j.drive_damping) + textOf(j.target_motion);
+  return text + textOf(j.motion);
+}
+
 std::string textOf(const ContactSettings &c) {
   if (!c.on) return "none";
   std::string passes, stick;
@@ -241,6 +255,12 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
     if (!b.velocity.isZero(0) || !b.angular_velocity.isZero(0))
       add(Kind::start, "start of body '" + b.name + "'", textOf(b.velocity) + " and " + textOf(b.angular_velocity));
   }
+  for (const Joint &j : scene.joints) {
+    const int what[] = {int(j.type), j.child, j.parent};
+    topology.add(what, sizeof what);
+    topology.add(j.point.data(), sizeof(Vec3));
+    topology.add(j.axes.data(), sizeof(Mat3));
+  }
   topology_hash = topology.hex();
   std::sort(names.begin(), names.end());
   for (const std::string &name : names) set.add(name + "\n");
@@ -260,6 +280,10 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
     holders.add(what, sizeof what);
     holders.add(textOf(c, scene));
     add(Kind::scene, at(c.isPin() ? "constraint at vertex " : "constraint at edge ", c.at, c.rod), textOf(c, scene));
+  }
+  for (const Joint &j : scene.joints) {
+    holders.add(j.name);
+    add(Kind::scene, "joint '" + j.name + "'", textOf(j));
   }
   add(Kind::scene, order_of_holders, "#" + holders.hex());
   for (const Collider &c : scene.colliders) add(Kind::scene, "collider '" + c.name + "'", textOf(c));

@@ -298,9 +298,11 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
                         (names.size() > 1 ? " and " + std::to_string(names.size() - 1) + " more" : "") + ")");
   if (out.scene.rods.empty()) map.at("rods").fail("a scene needs at least one rod");
   if (map.has("bodies"))
-    for (const YamlValue &v : map.at("bodies").items()) readBody(v, out);
+    for (const YamlValue &v : map.at("bodies").items()) readBody(v, sums.contact, out);
   if (!out.scene.bodies.empty() && !out.scene.rotation.angular_velocity.isZero(0))
     map.at("rotation").fail("a frame that turns has no forces on 'bodies' yet; take 'rotation' or the bodies away");
+  if (map.has("joints"))
+    for (const YamlValue &v : map.at("joints").items()) readJoint(v, out);
   if (map.has("supports"))
     for (const YamlValue &v : map.at("supports").items()) readSupport(v, out);
   if (map.has("constraints"))
@@ -312,9 +314,6 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
   if (map.has("colliders")) {
     for (const YamlValue &v : map.at("colliders").items()) readCollider(v, out.scene);
     if (!out.scene.colliders.empty()) completeContact(map.at("colliders"), overrides, out.scene);
-    if (!out.scene.colliders.empty() && !out.scene.bodies.empty())
-      out.notes.push_back("warning: " + map.at("colliders").place() +
-                          ": rods touch 'colliders', but 'bodies' not yet: they pass through them");
   }
   if (map.has("contact") && out.scene.colliders.empty())
     map.at("contact").fail(

@@ -69,6 +69,16 @@ Summary summarize(const Scene &scene, const Elements &elements, const State &sta
       out.total_moment += state.position[elements.rods[constraint.rod].first_vertex + constraint.at].cross(c.force);
     out.total_moment += c.moment;
   }
+  out.joint = actions.joint;
+  for (std::size_t k = 0; k < scene.joints.size(); ++k) {
+    const Joint &joint = scene.joints[k];
+    if (joint.parent >= 0) continue;
+    const Mat3 turned = rotationOf(state, elements.body(joint.child).group);
+    const Vec3 point =
+        state.body_position[joint.child] + turned * (joint.point - elements.bodyMass(joint.child).centre);
+    out.total_force += out.joint[k].force;
+    out.total_moment += point.cross(out.joint[k].force) + out.joint[k].moment;
+  }
   return out;
 }
 
@@ -95,7 +105,7 @@ std::vector<std::string> describe(const Summary &s, const Scene &scene) {
   mass << std::setprecision(5) << s.mass << " kg";
   row("mass", mass.str(), "centre " + textOf(s.centre_of_mass, "m"));
   const char *name = "reactions";
-  if (scene.supports.size() + scene.constraints.size() > 1)
+  if (scene.supports.size() + scene.constraints.size() + scene.joints.size() > 1)
     row(std::exchange(name, ""),
         textOf(s.total_force, "N") + " in all; about the origin " + textOf(s.total_moment, "N m"), "");
   for (std::size_t k = 0; k < scene.supports.size() && scene.supports.size() <= most_supports_told; ++k) {
@@ -121,6 +131,19 @@ std::vector<std::string> describe(const Summary &s, const Scene &scene) {
             (c.isPin() ? textOf(s.constraint[k].distance, "m") + " off"
                        : textOf(s.constraint[k].rotation, "rad") + " off"),
         "");
+  }
+  for (std::size_t k = 0; k < scene.joints.size() && scene.joints.size() <= most_supports_told; ++k) {
+    const Joint &j = scene.joints[k];
+    const JointReading &of = s.joint[k];
+    std::string what = textOf(of.force, "N") + ", " + textOf(of.moment, "N m") + ": " + std::string(nameOf(j.type)) +
+                       " '" + inOneLine(j.name) + "' of body '" + scene.bodies[std::size_t(j.child)].name + "'";
+    std::ostringstream at;
+    at << std::setprecision(5) << of.coordinate;
+    if (j.held().slidesFreely())
+      what += ", at " + at.str() + " m";
+    else if (j.type != Joint::Type::fixed)
+      what += ", at " + at.str() + " rad";
+    row(std::exchange(name, ""), what, "");
   }
   return lines;
 }

@@ -12,8 +12,9 @@
 namespace tendril {
 namespace {
 
-enum class On { vertices, edges, cells, supports, constraints, colliders, bodies };
-constexpr const char *places[] = {"vertices", "edges", "cells", "supports", "constraints", "colliders", "bodies"};
+enum class On { vertices, edges, cells, supports, constraints, colliders, bodies, joints };
+constexpr const char *places[] = {"vertices",    "edges",     "cells",  "supports",
+                                  "constraints", "colliders", "bodies", "joints"};
 
 /// Bodies by their origins and axes: places, quaternions, velocities, spins, and angular momenta about the centres of
 /// mass.
@@ -27,7 +28,8 @@ struct Snapshot {
   const State &state;
   RodStrains strains;
   RodActions actions;
-  std::vector<double> constraint_deviation = {}, constraint_force = {};
+  std::vector<double> constraint_deviation = {}, constraint_force = {}, joint_coordinate = {};
+  std::vector<Vec3> joint_distance = {}, joint_force = {}, joint_moment = {};
   std::vector<ContactReading> contacts = {};
   std::vector<Vec3> contact_force = {}, collider_force = {}, collider_moment = {}, collider_position = {};
   std::vector<Eigen::Vector4d> collider_rotation = {};
@@ -74,6 +76,12 @@ const Field fields[] = {
      [](const Snapshot &s) { return s.collider_force[0].data(); }},
     {"collider_moment", "N m", On::colliders, 3, From::contact,
      [](const Snapshot &s) { return s.collider_moment[0].data(); }},
+    // By how much the child is from the parent, and what acts on it: at the joint's point.
+    {"joint_coordinate", "m, rad", On::joints, 1, From::actions,
+     [](const Snapshot &s) { return s.joint_coordinate.data(); }},
+    {"joint_distance", "m", On::joints, 3, From::actions, [](const Snapshot &s) { return s.joint_distance[0].data(); }},
+    {"joint_force", "N", On::joints, 3, From::actions, [](const Snapshot &s) { return s.joint_force[0].data(); }},
+    {"joint_moment", "N m", On::joints, 3, From::actions, [](const Snapshot &s) { return s.joint_moment[0].data(); }},
     // Where obstacles stand, and quaternions w, x, y, z from their axes to the world's; where any moves.
     {"collider_position", "m", On::colliders, 3, From::motion,
      [](const Snapshot &s) { return s.collider_position[0].data(); }},
@@ -134,14 +142,15 @@ BodyMotion motionOfBodies(const Scene &scene, const Elements &elements, const St
   return motion;
 }
 
-std::array<int, 7> sizes(const Scene &scene, const Elements &e) {
+std::array<int, std::size(places)> sizes(const Scene &scene, const Elements &e) {
   return {e.vertices(),
           e.edges(),
           int(e.cell_slot.size()),
           int(e.support_slot.size()),
           int(e.constraint_slot.size()),
           int(scene.colliders.size()),
-          int(scene.bodies.size() + scene.held_bodies.size())};
+          int(scene.bodies.size() + scene.held_bodies.size()),
+          int(scene.joints.size())};
 }
 
 } // namespace
@@ -181,7 +190,7 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
     if ((f.source == From::contact && scene.colliders.empty()) || (f.source == From::motion && !scene.collidersMove()))
       continue;
     std::vector<hsize_t> slab{hsize_t(sizes(scene, elements)[std::size_t(f.place)])};
-    if (slab[0] == 0) continue; // cables have no cells, free rods no supports, constraints or bodies
+    if (slab[0] == 0) continue; // cables have no cells, free rods no supports, constraints, bodies or joints
     if (f.components > 1) slab.push_back(f.components);
     state_.back() = std::make_unique<Hdf5Series>(file_, std::string("state/") + f.name, slab);
     file_.writeAttribute(std::string("state/") + f.name, "unit", std::string(f.unit));
@@ -261,6 +270,12 @@ void TrajectoryWriter::writeFrame(const State &state) {
     for (const Vec3 *x : {&c.force, &c.moment})
       snapshot.constraint_force.insert(snapshot.constraint_force.end(), x->data(), x->data() + 3);
   }
+  for (const JointReading &j : snapshot.actions.joint) {
+    snapshot.joint_coordinate.push_back(j.coordinate);
+    snapshot.joint_distance.push_back(j.distance);
+    snapshot.joint_force.push_back(j.force);
+    snapshot.joint_moment.push_back(j.moment);
+  }
   for (std::size_t k = 0; k < state_.size(); ++k)
     if (state_[k]) state_[k]->append(fields[k].data(snapshot));
   const double step = double(state.step);
@@ -317,7 +332,7 @@ void TrajectoryWriter::flushWhenDue() {
 /// `rods`: a polyline each, with the fields of vertices; `edges`: a segment each, with those of edges as cell data as
 /// well; `bodies`: a point each, where they are written.
 void TrajectoryWriter::writeXdmf() const {
-  const std::array<int, 7> rows = sizes(scene_, elements_);
+  const auto rows = sizes(scene_, elements_);
   auto described = [&](const Field &f, bool of_cells = false) {
     return XdmfField{f.name, rows[std::size_t(f.place)], int(f.components), of_cells};
   };

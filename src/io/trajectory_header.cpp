@@ -66,6 +66,7 @@ void TrajectoryWriter::writeHeader(const Scene &scene, const Elements &elements,
   writeConstraints();
   writeColliders();
   writeBodies();
+  writeJoints();
   writeMaterials();
 }
 
@@ -222,6 +223,30 @@ void TrajectoryWriter::writeBodies() {
   file_.write("bodies/attachment_body", {bodies.size()}, bodies.data());
   file_.write("bodies/attachment_vertex", {vertices.size()}, vertices.data());
   file_.write("bodies/attachment_type", types);
+}
+
+void TrajectoryWriter::writeJoints() {
+  if (scene_.joints.empty()) return;
+  std::vector<std::string> names, types;
+  std::vector<int> children, parents;
+  std::vector<double> points, axes;
+  for (const Joint &j : scene_.joints) {
+    names.push_back(j.name);
+    types.emplace_back(nameOf(j.type));
+    children.push_back(j.child);
+    parents.push_back(j.parent);
+    points.insert(points.end(), j.point.data(), j.point.data() + 3);
+    const Vec3 axis = j.axes.col(2);
+    axes.insert(axes.end(), axis.data(), axis.data() + 3);
+  }
+  const std::size_t n = names.size();
+  file_.createGroup("joints");
+  file_.write("joints/name", names);
+  file_.write("joints/type", types);
+  file_.write("joints/child", {n}, children.data());
+  file_.write("joints/parent", {n}, parents.data()); // -1: the world, or a body that no step moves
+  file_.write("joints/point", {n, 3}, points.data(), "m");
+  file_.write("joints/axis", {n, 3}, axes.data(), "1");
 }
 
 void TrajectoryWriter::writeMaterials() {

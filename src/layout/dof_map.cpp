@@ -120,6 +120,9 @@ void DofMap::layOut(const Scene &scene) {
   for (const Junction &j : scene.junctions)
     for (const Junction::Member &m : j.members) along[m.rod] += 4; // frames and half cells of two edges
   for (const Body &b : scene.bodies) along[b.rod] += 2;
+  for (const Joint &j : scene.joints) along[j.rod] += BodyPair::slots;
+  for (int b = 0; b < int(scene.bodies.size()); ++b)
+    if (scene.touchesBody(b)) along[scene.bodies[b].rod] += BodyPair::slots;
   for (const Attachment &a : scene.attachments) along[a.rod] += 5; // and a frame of the vertex
   slots_ = lanes;                                                  // room for the frame before the first rod
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {

@@ -106,6 +106,16 @@ PetscErrorCode DofMap::createMatrix(RodSet rods, bool joins, Mat *matrix, Patter
           for (int c = a; c < 3; ++c)
             couple({{unknown(s, a), false}}, {{unknown(s, c), false}}, EdgeBlocks::vertex(a, c), s - rod.first_slot,
                    a == c);
+    for (const BodyPair &p : pairs({r, r + 1}))
+      for (int i = 0; i < p.variables(); ++i)
+        for (int j = i; j < p.variables(); ++j) {
+          const auto [plane, at] = EdgeBlocks::pair(i, j);
+          auto of = [&](int variable) {
+            const auto [slot, a] = p.place(variable);
+            return std::vector<Part>{{unknown(slot, a), false}};
+          };
+          couple(of(i), of(j), plane, p.first + at - rod.first_slot, i == j);
+        }
     for (const Tie &t : ties({r, r + 1})) {
       auto difference = [&](int a) {
         std::vector<Part> parts;

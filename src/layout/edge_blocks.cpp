@@ -81,6 +81,14 @@ void EdgeBlocks::multiply(const RodRange &rod, const Joins &of, const Planes &x,
       for (int r = 0; r < 3; ++r)
         for (int c = 0; c < 3; ++c)
           y[r][s] += value(vertex(std::min(r, c), std::max(r, c)), s - rod.first_slot) * x[c][s];
+  for (const BodyPair &p : of.pairs)
+    for (int r = 0; r < p.variables(); ++r)
+      for (int c = 0; c < p.variables(); ++c) {
+        const auto [plane, slot] = pair(std::min(r, c), std::max(r, c));
+        const auto [to, row] = p.place(r, true);
+        const auto [from, column] = p.place(c);
+        y[row][to] += value(plane, p.first + slot - rod.first_slot) * x[column][from];
+      }
   for (const Tie &t : of.ties) {
     const Vec3 moved = x.vector(0, t.slot) - x.vector(0, t.copy);
     for (int r = 0; r < 3; ++r)
@@ -125,6 +133,16 @@ double EdgeBlocks::magnitude(const RodRange &rod, const Joins &of, const Planes 
       for (int r = 0; r < 3; ++r)
         for (int c = r; c < 3; ++c)
           sum += std::pow((r == c ? 1 : 2) * entry(rod, vertex(r, c))[s - rod.first_slot] * x[r][s] * x[c][s], 2);
+  for (const BodyPair &p : of.pairs)
+    for (int r = 0; r < p.variables(); ++r)
+      for (int c = r; c < p.variables(); ++c) {
+        const auto [plane, slot] = pair(r, c);
+        const auto [first, row] = p.place(r);
+        const auto [second, column] = p.place(c);
+        sum += std::pow((r == c ? 1 : 2) * entry(rod, plane)[p.first + slot - rod.first_slot] * x[row][first] *
+                            x[column][second],
+                        2);
+      }
   for (const Tie &t : of.ties) {
     const Vec3 moved = x.vector(0, t.slot) - x.vector(0, t.copy);
     for (int r = 0; r < 3; ++r)

@@ -177,7 +177,8 @@ Elements::Elements(const Scene &scene, const DofMap &dofs)
       support_slot(scene.supports.size(), -1), rod_cells{0}, groups(dofs.groups()),
       supports_(scene.supports, rods.size()), forces_(scene.forces, rods.size()), moments_(scene.moments, rods.size()),
       joined_edges_(dofs.joinedEdges()), joined_vertices_(dofs.joinedVertices()), ties_(dofs.ties()),
-      bodies_(dofs.bodies()) {
+      bodies_(dofs.bodies()), pairs_(dofs.pairs()), place_of_joint_(scene.joints.size()),
+      place_of_contact_(scene.bodies.size(), -1) {
   std::vector<int> free_slots; ///< per rod, behind those of its supports
   constants_ = Planes(7, slots);
   joined_frame_.resize(joined_edges_.items.size());
@@ -239,6 +240,23 @@ void Elements::weighBodies(const Scene &scene) {
     if (j.isOnBody())
       arm_[j.number] = (j.isVertex() ? scene.rods[j.rod].position[j.vertex] : scene.constraints[j.attachment].point) -
                        body_mass_[j.body].centre;
+  for (const MassProperties &all : body_mass_) {
+    inverse_inertia_.push_back(all.inertia.ldlt().solve(Mat3::Identity()));
+    body_size_.push_back(std::sqrt(all.inertia.trace() / all.mass));
+  }
+  auto reach = [&](int body, const Vec3 &arm) { body_size_[body] = std::max(body_size_[body], arm.norm()); };
+  for (const JoinedVertex &j : joined_vertices_.items)
+    if (j.isOnBody()) reach(j.body, arm_[j.number]);
+  for (std::size_t k = 0; k < pairs_.items.size(); ++k) {
+    if (pairs_.items[k].joint < 0) {
+      place_of_contact_[pairs_.items[k].body] = int(k);
+      continue;
+    }
+    const Joint &joint = scene.joints[pairs_.items[k].joint];
+    place_of_joint_[pairs_.items[k].joint] = int(k);
+    for (const int body : {joint.child, joint.parent})
+      if (body >= 0) reach(body, joint.point - body_mass_[body].centre);
+  }
 }
 
 /// Slots behind those of supports along a rod.

@@ -39,6 +39,25 @@ void DofMap::joinBodies(const Scene &scene, std::vector<int> &free_slots) {
     unknown_end_[body.rod] = std::max(unknown_end_[body.rod], rotation + 1);
     joined_[body.rod] = true;
   }
+  auto makePair = [&](const JoinedBody &body, int joint) {
+    const int first = rods_[body.rod].looseSlot() + free_slots[body.rod];
+    free_slots[body.rod] += BodyPair::slots;
+    return BodyPair{body.rod, first, joint, body.body, {body.position, body.rotation, -1, -1}};
+  };
+  for (int k = 0; k < int(scene.joints.size()); ++k) {
+    const Joint &joint = scene.joints[k];
+    const JoinedBody &child = bodies_.items[joint.child];
+    BodyPair pair = makePair(child, k);
+    if (joint.parent >= 0) {
+      const JoinedBody &parent = bodies_.items[joint.parent];
+      pair.of[2] = parent.position;
+      pair.of[3] = parent.rotation;
+      makeIsland(islands_[joint.rod], islands_[parent.rod]);
+    }
+    pairs_.items.push_back(pair);
+  }
+  for (int b = 0; b < int(scene.bodies.size()); ++b)
+    if (scene.touchesBody(b)) pairs_.items.push_back(makePair(bodies_.items[b], -1));
   for (int k = 0; k < int(scene.attachments.size()); ++k) {
     const Attachment &a = scene.attachments[k];
     const RodRange &range = rods_[a.rod];
@@ -78,6 +97,7 @@ void DofMap::join(const Scene &scene, std::vector<int> free_slots) {
   joined_edges_ = {};
   ties_ = {};
   bodies_ = {};
+  pairs_ = {};
   groups_ = 0;
   islands_.clear();
   joined_.assign(rods_.size(), false);
@@ -118,6 +138,7 @@ void DofMap::join(const Scene &scene, std::vector<int> free_slots) {
   joined_edges_.sort(rods_.size());
   ties_.sort(rods_.size());
   bodies_.sort(rods_.size());
+  pairs_.sort(rods_.size());
   arms_.assign(joined_vertices_.items.size(), Vec3::Zero());
 }
 
@@ -145,6 +166,9 @@ void DofMap::foldJoined(RodSet islands, Planes &sums) const {
   };
   for (const Tie &t : ties(islands))
     if (!t.isToBody()) move(t.copy, t.of);
+  for (const BodyPair &p : pairs(islands))
+    for (const int k : {0, 1})
+      if (p.variables() > 6) move(p.parent(k), p.of[k + 2]);
   for (const JoinedVertex &j : joinedVertices(islands)) {
     if (j.isOnBody()) {
       sums.setVector(0, j.frame, arm(j).cross(sums.vector(0, j.slot)));

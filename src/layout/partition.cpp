@@ -40,6 +40,8 @@ Islands islandsOf(const Scene &scene) {
       join(c.rod, scene.bodies[c.to_body].rod);
   for (const Body &b : scene.bodies) join(b.rod, b.rod);
   for (const Attachment &a : scene.attachments) join(scene.bodies[a.body].rod, a.rod);
+  for (const Joint &j : scene.joints)
+    if (j.parent >= 0) join(j.rod, scene.bodies[j.parent].rod);
   for (std::size_t r = 0; r < n; ++r) islands.rods[rootOf(int(r))].push_back(int(r));
   for (const int r : any) islands.joined[rootOf(r)] = true;
   return islands;

@@ -322,6 +322,7 @@ Scene remesh(const Scene &written, const std::vector<Drawing> &drawings, const s
   }
   scene.bodies = written.bodies;
   scene.held_bodies = written.held_bodies;
+  scene.joints = written.joints;
   for (const Attachment &attachment : written.attachments) {
     Attachment &a = scene.attachments.emplace_back(attachment);
     const Drawing &drawing = drawings[a.rod];

@@ -50,7 +50,8 @@ bool Scene::strainsDissipate() const {
   if (whole) return whole->strains_dissipate;
   return std::any_of(rods.begin(), rods.end(),
                      [](const Rod &rod) { return rod.material.stiffness_damping_coefficient != 0; }) ||
-         std::any_of(constraints.begin(), constraints.end(), [](const Constraint &c) { return c.damping != 0; });
+         std::any_of(constraints.begin(), constraints.end(), [](const Constraint &c) { return c.damping != 0; }) ||
+         std::any_of(joints.begin(), joints.end(), [](const Joint &j) { return j.dissipates(); });
 }
 
 template <class Item>
@@ -89,6 +90,12 @@ Scene withRods(const Scene &scene, const std::vector<int> &rods) {
   for (Attachment &a : out.attachments) a.body = body[a.body];
   for (Constraint &c : out.constraints)
     if (c.isToBody()) c.to_body = body[c.to_body];
+  for (const Joint &j : scene.joints) {
+    if (body[j.child] < 0) continue;
+    Joint &kept = out.joints.emplace_back(j);
+    kept.child = body[j.child];
+    if (j.parent >= 0) kept.parent = body[j.parent];
+  }
   out.hostBodies();
   keep(scene.forces, place, out.forces);
   keep(scene.moments, place, out.moments);
@@ -225,8 +232,17 @@ void Scene::hostBodies() {
   for (const Attachment &a : attachments) first[a.body] = std::min(first[a.body], a.rod);
   for (const Constraint &c : constraints)
     if (c.isToBody()) first[c.to_body] = std::min(first[c.to_body], c.rod);
+  for (bool spreads = true; spreads;) {
+    spreads = false;
+    for (const Joint &j : joints)
+      if (j.parent >= 0 && first[j.child] != first[j.parent]) {
+        first[j.child] = first[j.parent] = std::min(first[j.child], first[j.parent]);
+        spreads = true;
+      }
+  }
   for (std::size_t b = 0; b < bodies.size(); ++b)
     if (first[b] < int(rods.size())) bodies[b].rod = first[b];
+  for (Joint &j : joints) j.rod = bodies[j.child].rod;
 }
 
 bool Scene::hasCouples() const {

@@ -63,6 +63,13 @@ void CondensedFactor::factor(const BandedSystem &system) {
   for (const Run &run : runs_)
     for (const JoinedEdge *frame : {run.near_frame, run.far_frame})
       if (frame) add(ownBlock(dofs_.rods()[run.rod], frame->frame));
+  for (const BodyPair &p : dofs_.pairs(rods_))
+    for (int r = 0; r < p.variables(); ++r)
+      for (int c = 0; c < p.variables(); ++c) {
+        const RodRange &rod = dofs_.rods()[p.rod];
+        const auto [plane, slot] = EdgeBlocks::pair(std::min(r, c), std::max(r, c));
+        entries_[next++] = system.blocks->entry(rod, plane)[p.first + slot - rod.first_slot];
+      }
   for (const JoinedBody &b : dofs_.bodies(rods_))
     for (const int slot : {b.position, b.rotation}) add(ownBlock(dofs_.rods()[b.rod], slot));
   regular_ = unknown_.empty() || schur_->factor(entries_);

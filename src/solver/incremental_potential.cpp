@@ -183,7 +183,8 @@ void IncrementalPotential::assembleRod(int r, HessianKind hessian) {
   for (int a = 0; a < slot_size; ++a)
     for (int s = rod.first_slot; s < rod.vertexEnd() + 2; s += lanes)
       addTo(d.gradient[a] + s, read<Pack>(d.equilibrium[a] + s));
-  dofs_.forBeside({r, r + 1}, [&](int s) { d.gradient.setVector(0, s, d.equilibrium.vector(0, s)); });
+  dofs_.forBeside({r, r + 1},
+                  [&](int s) { d.gradient.setVector(0, s, d.gradient.vector(0, s) + d.equilibrium.vector(0, s)); });
   dofs_.fold(rod, d.gradient);
   dofs_.fold(rod, d.equilibrium);
   if (hessian != HessianKind::none) d.blocks.fold(rod);
@@ -247,6 +248,7 @@ std::array<Vec3, 2> IncrementalPotential::actionOf(const Holder &holder) {
   std::array<Vec3, 2> action{Vec3::Zero(), Vec3::Zero()};
   const int slot = holder.support      ? elements_.support_slot[holder.index]
                    : holder.constraint ? elements_.constraint_slot[holder.index]
+                   : holder.joint      ? elements_.pairOf(holder.index).parent(holder.drives)
                                        : -1;
   for (const auto &term : terms_) {
     if (slot < 0 && !holder.collider) break;

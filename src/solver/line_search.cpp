@@ -87,9 +87,12 @@ IncrementalPotential::RodEnergy NewtonSolver::tryLength(RodSet island, double le
   (void)PetscLogEventBegin(events().configuration, 0, 0, 0, 0);
   double free = 1;
   const RetractionKind kind = potential_->settings.retraction;
-  const bool corrects = kind == RetractionKind::length && potential_->dofs().isJoined(island),
-             possible = corrects ? tryCorrected(island, length, &free)
-                                 : potential_->tryMove(work_->increment, length, island, kind, work_->trial, &free);
+  const bool joined = potential_->dofs().isJoined(island),
+             possible = joined && kind == RetractionKind::length
+                            ? tryCorrected(island, length, &free)
+                            : potential_->tryMove(work_->increment, length, island, kind, work_->trial, &free);
+  for (int r = island.begin; r < island.end && possible && joined; ++r)
+    potential_->setTermForces(work_->increment, length, r, work_->trial);
   (void)PetscLogEventEnd(events().configuration, 0, 0, 0, 0);
   (void)PetscLogEventBegin(events().energy, 0, 0, 0, 0);
   for (int r = island.begin; r < island.end; ++r) {
@@ -204,6 +207,9 @@ bool NewtonSolver::search(RodSet island, double *lambda) {
     standstill.known = fresh_ && !work_->indefinite[r] && !moving;
     standstill.partial = work_->zero[r] > 0;
     standstill.energy = -dot(rod, gradient, work_->increment);
+    for (const JoinedBody &b : dofs.bodies({r, r + 1}))
+      for (const int s : {b.position, b.rotation})
+        standstill.energy -= gradient.vector(0, s).dot(work_->increment.vector(0, s));
     for (int a = 0; a < slot_size; ++a)
       for (int s = rod.first_slot; s < rod.vertexEnd() + (rod.closed ? 2 : 0); s += lanes) {
         const Pack step = read<Pack>(work_->increment[a] + s);
@@ -298,8 +304,8 @@ void NewtonSolver::predict() {
     double before = 0, after = 0;
     for (int r = island.begin; r < island.end; ++r) {
       work_->tried[r] = potential_->rodEnergy(work_->trial, r);
-      after += work_->tried[r].value;
-      before += energyAtIterate(r).value;
+      after += work_->tried[r].value - potential_->violation(work_->trial, r);
+      before += energyAtIterate(r).value - potential_->violation(potential_->iterate(), r);
     }
     if (!(after < before)) continue;
     for (int r = island.begin; r < island.end; ++r) {

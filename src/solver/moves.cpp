@@ -109,6 +109,7 @@ double IncrementalPotential::addExcess(const Planes &increment, double scale, co
     force.setVector(0, t.copy, force.vector(0, t.copy) - pull);
     most = std::max(most, excess.norm() / scales_[r].shortest_edge);
   }
+  for (const auto &term : terms_) most = std::max(most, term->addExcess(iterate_, increment, scale, trial, r, force));
   return most;
 }
 

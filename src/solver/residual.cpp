@@ -115,9 +115,7 @@ void includeBody(const Elements &elements, const JoinedBody &body, const Step &s
                  const Configuration &iterate, const Planes &out_of_balance, double unit, double load,
                  Residual *residual) {
   const MassProperties &all = elements.bodyMass(body.body);
-  double size = std::sqrt(all.inertia.trace() / all.mass);
-  for (const JoinedVertex &j : elements.joinedVertices({0, int(elements.rods.size())}))
-    if (j.isOnBody() && j.body == body.body) size = std::max(size, elements.armAsDrawn(j).norm());
+  const double size = elements.bodySize(body.body);
   const double force = out_of_balance.vector(0, body.position).norm(),
                moment = out_of_balance.vector(0, body.rotation).norm(), by = load > 0 ? load : unit;
   residual->force = std::max(residual->force, force / by);

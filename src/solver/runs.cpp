@@ -193,6 +193,14 @@ void CondensedFactor::group(std::vector<int> &rows, std::vector<int> &columns) {
   for (const Run &run : runs_) // ... frames ...
     for (const auto &[frame, places] : {std::pair(run.near_frame, &run.near), std::pair(run.far_frame, &run.far)})
       if (frame) own({(*places)[edge_at], (*places)[edge_at + 1], (*places)[edge_at + 2]});
+  for (const BodyPair &p : dofs_.pairs(rods_)) // ... pairs of bodies ...
+    for (int r = 0; r < p.variables(); ++r)
+      for (int c = 0; c < p.variables(); ++c) {
+        const auto [slot, a] = p.place(r);
+        const auto [other, b] = p.place(c);
+        rows.push_back(numberOf(dofs_.unknown(slot, a)));
+        columns.push_back(numberOf(dofs_.unknown(other, b)));
+      }
   for (const JoinedBody &b : dofs_.bodies(rods_)) // ... and bodies
     for (const int slot : {b.position, b.rotation}) {
       const int first = numberOf(dofs_.unknown(slot, 0));

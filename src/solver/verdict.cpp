@@ -27,25 +27,37 @@ bool isAtNoise(const Residual &r, double rtol) {
          r.compatibility <= std::max(compatibility_rtol * rtol, r.compatibility_floor);
 }
 
-/// Root mean square of the displacements of a rod over its length and of its twists.
+/// Root mean square of the displacements of a rod, and of the bodies beside it, over its length, and of its twists.
 double NewtonSolver::sizeOf(int r, const Planes &increment) const {
-  const RodRange &rod = potential_->elements().rods[r];
+  const Elements &elements = potential_->elements();
+  const RodRange &rod = elements.rods[r];
   double positions = 0, twists = 0;
+  int places = rod.vertices;
   for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) positions += increment.vector(0, s).squaredNorm();
+  for (const JoinedBody &b : elements.bodies({r, r + 1})) {
+    positions += increment.vector(0, b.position).squaredNorm() +
+                 std::pow(elements.bodySize(b.body), 2) * increment.vector(0, b.rotation).squaredNorm();
+    ++places;
+  }
   for (int s = rod.first_slot; rod.twist && s < rod.edgeEnd(); ++s) twists += increment[3][s] * increment[3][s];
   const double length = potential_->length(r);
-  return std::sqrt(positions / (length * length * rod.vertices) + twists / rod.edges);
+  return std::sqrt(positions / (length * length * places) + twists / rod.edges);
 }
 
 /// What the step has moved the vertices of a rod by so far, as sizeOf, less the mean of them all: a rod that flies has
 /// not moved for that.
 double NewtonSolver::movedBy(int r) const {
-  const RodRange &rod = potential_->elements().rods[r];
+  const Elements &elements = potential_->elements();
+  const RodRange &rod = elements.rods[r];
+  const std::span<const JoinedBody> bodies = elements.bodies({r, r + 1});
   Planes &moved = work_->coordinates; // free until the iterate is written
   potential_->coordinates(moved, {r, r + 1});
   Vec3 mean = Vec3::Zero();
-  for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) mean += moved.vector(0, s) / rod.vertices;
+  for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) mean += moved.vector(0, s);
+  for (const JoinedBody &b : bodies) mean += moved.vector(0, b.position);
+  mean /= double(rod.vertices) + double(bodies.size());
   for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) moved.setVector(0, s, moved.vector(0, s) - mean);
+  for (const JoinedBody &b : bodies) moved.setVector(0, b.position, moved.vector(0, b.position) - mean);
   return sizeOf(r, moved);
 }
 
@@ -170,7 +182,10 @@ PetscErrorCode NewtonSolver::verify(bool *little) {
   *little = regular;
   for (int r = rods_.begin; r < rods_.end && regular; ++r) {
     double size;
-    work_->standstill[r].energy = dot(potential_->elements().rods[r], gradient, work_->increment);
+    double &energy = work_->standstill[r].energy = dot(potential_->elements().rods[r], gradient, work_->increment);
+    for (const JoinedBody &b : potential_->elements().bodies({r, r + 1}))
+      for (const int s : {b.position, b.rotation})
+        energy += gradient.vector(0, s).dot(work_->increment.vector(0, s));
     const bool here = isLittle(r, &size);
     if (here) work_->left[r] = std::max(work_->left[r], size);
     if ((here || isNeutral(r)) && (work_->zero[r] == 0 || isBalanced(r, rtol))) continue;

@@ -97,7 +97,7 @@ void settleBodies(const Elements &elements, RodSet islands, State &state) {
   for (const JoinedBody &b : elements.bodies(islands)) {
     BodyRate &rate = state.body_rate[b.body];
     const Mat3 turned = rotationOf(state, b.group);
-    rate.spin = turned * elements.bodyMass(b.body).inertia.ldlt().solve(turned.transpose() * rate.momentum);
+    rate.spin = turned * elements.spinOf(b.body, turned.transpose() * rate.momentum);
   }
   for (const JoinedVertex &j : elements.joinedVertices(islands)) {
     if (!j.isOnBody() || !j.isVertex()) continue;

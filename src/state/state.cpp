@@ -28,6 +28,7 @@ void Configuration::copyEnds(const Elements &elements, int r, const Configuratio
     for (const int slot : {b.position, b.rotation}) copySlots(from, slot, slot + 1);
   for (const JoinedVertex &j : elements.joinedVertices({r, r + 1}))
     if (j.isOnBody()) copySlots(from, j.frame, j.frame + 1);
+  for (const BodyPair &p : elements.pairs({r, r + 1})) copySlots(from, p.first, p.first + BodyPair::slots);
   for (const int k : elements.constraintsOf(r)) {
     const int slot = elements.constraint_slot[k];
     copySlots(from, slot, slot + 1);
@@ -79,6 +80,7 @@ State initialState(const Scene &scene, const Elements &elements) {
     s.body_rate.push_back({body.velocity + body.angular_velocity.cross(all.centre - body.own.centre),
                            body.angular_velocity, all.inertia * body.angular_velocity});
   }
+  s.joints.resize(scene.joints.size());
   const Configuration c = configurationOf(s, scene, elements, 0);
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
     const Rod &rod = scene.rods[r];
@@ -135,6 +137,16 @@ void setTargets(const Scene &scene, const Elements &elements, double motion_time
   for (std::size_t k = 0; k < scene.constraints.size(); ++k)
     if (scene.constraints[k].isToWorld()) // others have a vertex or a body for their target: see setRod
       setTarget(scene.constraints[k], elements.constraint_slot[k], motion_time, c);
+  for (std::size_t k = 0; k < scene.joints.size(); ++k)
+    setTarget(scene.joints[k], elements.pairOf(int(k)), motion_time, c);
+}
+
+void setTarget(const Joint &joint, const BodyPair &pair, double motion_time, Configuration &c) {
+  c.setPosition(pair.target(), {joint.targetAt(motion_time), 0, 0}, Vec3::Zero());
+  if (joint.parent >= 0) return;
+  const Mat3 axes = joint.motion.rotationAt(motion_time) * joint.axes;
+  c.setPosition(pair.parent(0), joint.point + joint.motion.displacementAt(motion_time), Vec3::Zero());
+  c.setFrame(pair.parent(0), {axes.col(0), axes.col(1), 1});
 }
 
 Mat3 rotationOf(const State &state, int group) {
@@ -208,6 +220,11 @@ Frame joinedFrame(const State &state, const Elements &elements, const JoinedEdge
     c.setFrame(j.frame, joinedFrame(state, elements, j));
     c.setPosition(j.frame, Vec3::Zero(), Vec3::Zero());
     c[C::spin][j.frame] = 0;
+  }
+  for (const BodyPair &p : elements.pairs({r, r + 1})) {
+    if (p.joint < 0) continue;
+    for (int k = 0; k < BodyPair::forces; ++k) c[C::axial_force][p.first + k] = state.joints[p.joint].force[k];
+    c[C::winding][p.target()] = state.joints[p.joint].coordinate;
   }
   for (const Tie &t : elements.ties({r, r + 1}))
     if (!t.isToBody()) c.setPosition(t.copy, state.position[t.vertex], state.position_low[t.vertex]);

@@ -19,6 +19,8 @@ SupportMotion::SupportMotion(const Scene &scene, const DofMap &dofs, const Eleme
       moving_targets_.resize(elements.rods.size());
       moving_targets_[scene.constraints[k].rod].push_back(int(k));
     }
+  for (std::size_t k = 0; k < scene.joints.size(); ++k)
+    if (scene.joints[k].motion.moves() || scene.joints[k].target_motion.moves()) moving_joints_.push_back(int(k));
 }
 
 void SupportMotion::turn(const Configuration &from, double from_time, double to_time) {
@@ -68,6 +70,8 @@ void SupportMotion::followTarget(int k, Configuration &iterate) {
 void SupportMotion::follow(int r, Configuration &iterate) {
   if (!moving_targets_.empty())
     for (const int k : moving_targets_[r]) followTarget(k, iterate);
+  for (const int k : moving_joints_)
+    if (scene_.joints[k].rod == r) setTarget(scene_.joints[k], elements_.pairOf(k), to_time_, iterate);
   if (turned_[r].empty()) return;
   for (const Turned &turned : turned_[r]) iterate.setFrame(turned.slot, turned.end);
   auto turning = [&](int frame) {

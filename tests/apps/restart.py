@@ -337,7 +337,20 @@ constraints:
 - {type: pin, rod: a, vertex: 6, body: puck, stiffness: 5, damping: 0.01}
 - {type: rotation, rod: a, edge: 6, body: puck, stiffness: 0.01}
 """)
-    for scene, integrator in (("bodies", "euler"), ("bodies", "bdf2"), ("bodies", "midpoint"), ("bodies", "generalized_alpha"),
+    with open(tmp + "/bodies.yaml") as scene:
+        write(tmp + "/jointed.yaml", scene.read() + """- {type: pin, rod: a, vertex: 8, body: arm}
+joints:
+- {name: exact, type: hinge, child: lower, parent: arm, point: [0.2, 0.13, 0], axis: [1, 0, 1], range: [-0.3, 2]}
+- {name: motor, type: hinge, child: arm, parent: puck, point: [0.17, 0.06, 0], drive: {table: [[0, 0], [0.1, 0.3], [1, 1]], stiffness: 0.01, damping: 0.001}}
+- {name: soft, type: ball, child: bob, point: [0.5, 0, 0.02], stiffness: 5, damping: 0.1}
+colliders:
+- {name: floor, plane: {normal: [0, 1, 0]}, position: [0, -0.03, 0]}
+contact: {friction: 0.3, radius: 0.002}
+""")
+    with open(tmp + "/jointed.yaml") as scene:
+        arms = "bodies:\n" + "".join(f"- {{name: {name}, box: {{size: [0.02, 0.06, 0.02]}}, density: 800, position: [0.2, {y}, 0]}}\n" for name, y in (("arm", 0.1), ("lower", 0.16)))
+        write(tmp + "/jointed.yaml", scene.read().replace("bodies:\n", arms))
+    for scene, integrator in (("jointed", "euler"), ("jointed", "bdf2"), ("jointed", "generalized_alpha"), ("bodies", "euler"), ("bodies", "bdf2"), ("bodies", "midpoint"), ("bodies", "generalized_alpha"),
                               ("bodies", "energy_momentum"), ("tied", "euler"), ("tied", "bdf2"), ("tied", "midpoint"), ("joined", "euler"), ("joined", "bdf2"),
                               ("joined", "sdirk2"), ("joined", "midpoint"), ("joined", "generalized_alpha")):
         base = ["-scene", f"{tmp}/{scene}.yaml", "-integrator", integrator, "-output_interval", 0.05]

@@ -48,6 +48,12 @@ public:
       for (Vec3 *v : {&rate.translation, &rate.spin, &rate.momentum})
         for (double &x : *v) (*this)(x);
   }
+  void operator()(std::vector<JointState> &joints) {
+    for (JointState &joint : joints) {
+      for (double &x : joint.force) (*this)(x);
+      (*this)(joint.coordinate);
+    }
+  }
   void operator()(std::vector<Rates> &all) {
     all.resize(2);
     for (Rates &rates : all) {
@@ -102,6 +108,12 @@ Scene sceneWithBody() {
   Body body;
   body.own = boxMass({0.1, 0.2, 0.3}, 100).moved(Mat3::Identity(), {0, 2, 0});
   scene.bodies = {body};
+  Joint joint{};
+  joint.name = "hinge";
+  joint.type = Joint::Type::hinge;
+  joint.point = Vec3::Zero();
+  joint.axes = Mat3::Identity();
+  scene.joints = {joint};
   scene.attachments = {{"tie", 1, 2, 0, true, frameAtVertex(scene.rods[1], 2)}};
   scene.hostBodies();
   return scene;

@@ -183,13 +183,15 @@ def islands():
     text += "bodies:\n"
     for k, name in enumerate(("bar", "bob", "puck", "alone")):
         text += f"  - {{name: {name}, box: {{size: [0.02, 0.03, 0.04]}}, density: 500, position: [0.2, -0.12, {0.1 * k}], angular_velocity: [1, 0, {k}]}}\n"
+    text += "joints:\n  - {type: hinge, child: alone, parent: puck, point: [0.2, -0.12, 0.25], axis: [1, 0, 0], drive: {stiffness: 0.01, damping: 1e-4}}\n"
+    text += "  - {type: ball, child: bob, point: [0.2, -0.1, 0.1], stiffness: 100, damping: 0.1}\n"
     return text
 
 
 def group_islands():
     path = write("islands", islands())
     for method in ("bdf2",) if SHORT else ("euler", "bdf2"):
-        same(f"islands_{method}", "-scene", path, "-integrator", method, "-output_fields", "all,reaction,constraint_force")
+        same(f"islands_{method}", "-scene", path, "-integrator", method, "-output_fields", "all,reaction,constraint_force,joint_force,joint_moment")
     same("islands_metis", "-scene", path, "-partition", "metis")
     # Only the rank of the ring with an arm, which MUMPS takes, asks for an option of MUMPS.
     ring = re.sub(r"(supports:\n)", r"  - {name: hoop, ring: {radius: 0.1, center: [0, 0, -1], edges: 60}, material: &rubber {radius: 1e-3, young: 1e7, poisson: 0.4, density: 1000}}\n"
@@ -212,6 +214,9 @@ def contacts():
     text = "gravity: [0, -9.81, 0]\nsimulation: {mode: dynamic, dt: 0.005, t_end: 0.15}\nrods:\n" + rods(rng, 40, (20, 40))
     text += ("contact: {friction: 0.3}\ncolliders:\n  - {name: floor, plane: {normal: [0, 1, 0]}, position: [0, -0.15, 0]}\n"
              "  - {name: ram, box: {size: [0.1, 0.02, 2]}, position: [0.2, -0.3, 0.4], motion: {velocity: [0, 1, 0]}}\n")
+    text += "bodies:\n"
+    for k, shape in enumerate(("box: {size: [0.03, 0.02, 0.04]}", "sphere: {radius: 0.02}", "cylinder: {radius: 0.02, length: 0.05}")):
+        text += f"  - {{{shape}, density: 800, position: [0.2, {-0.1 - 0.01 * k}, {0.3 + 0.1 * k}], angular_velocity: [3, 0, {k}]}}\n"
     return text
 
 

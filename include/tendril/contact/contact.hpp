@@ -44,6 +44,8 @@ struct Touch {
   double gap = HUGE_VAL; ///< between surfaces [m]
   double arc = 0;        ///< along the rod at rest [m]
 };
+/// The least gap of each body and obstacle near it; `rod` is the body's number.
+std::vector<Touch> tightestOfBodies(const Scene &scene, const Elements &elements, const Configuration &c);
 /// That of each rod and obstacle near it, the least gap first.
 std::vector<Touch> tightest(const Scene &scene, const Elements &elements, const Configuration &c);
 

@@ -4,6 +4,7 @@
 /// derives the balances.
 
 #include "tendril/energy/constraint.hpp"
+#include "tendril/energy/joint.hpp"
 
 namespace tendril {
 
@@ -33,6 +34,7 @@ struct RodActions {
   /// (ns) The moment that goes with it, about its vertex: of clamps and of `fix_twist`; zero for pins [N m].
   std::vector<Vec3> reaction_moment;
   std::vector<ConstraintReading> constraint; ///< (nc)
+  std::vector<JointReading> joint;           ///< (nj)
 };
 /// With forces F and couples C, at an equilibrium and whatever the edge length: force(i) = force(i+1) + F(i+1) and
 /// moment(i) = moment(i+1) + e(i) x force(i) + C(i).

@@ -127,6 +127,19 @@ public:
   /// How far rounding blurs the energy, beyond that of its value and of strains [J]. \param blur of an edge over its
   /// length
   virtual double noise(const Configuration & /*configuration*/, int /*rod*/, double /*blur*/) const { return 0; }
+  /// Forces that are unknowns of their own, as they are at a trial: what the linearised constraints ask for.
+  virtual void setTrialForces(const Configuration & /*iterate*/, const Planes & /*increment*/, double /*scale*/,
+                              int /*rod*/, Configuration & /*trial*/) const {}
+  /// Adds the forces of exact constraints by what a trial has changed them by beyond what an increment does to first
+  /// order. \return that at most, over the size of what they hold
+  virtual double addExcess(const Configuration & /*iterate*/, const Planes & /*increment*/, double /*scale*/,
+                           const Configuration & /*trial*/, int /*rod*/, Planes & /*force*/) const {
+    return 0;
+  }
+  /// What of the energy of a rod stands for exact constraints that are not met [J].
+  virtual double violation(const Configuration & /*configuration*/, int /*rod*/) const { return 0; }
+  /// By how much exact constraints beside a rod are missed at most, over the size of what they hold.
+  virtual double mismatch(const Configuration & /*configuration*/, int /*rod*/) const { return 0; }
   /// What holds a rod from a slot of its own, the frame of a support or the target of a constraint, does to it:
   /// derivatives of the energy by moving it [N], and by turning it about axes fixed in space [N m].
   virtual std::array<Vec3, 2> actionFrom(int /*slot*/, const Configuration & /*configuration*/, int /*rod*/) const {

@@ -47,8 +47,10 @@ struct Holder {
   const Support *support = nullptr;       ///< or null
   const Constraint *constraint = nullptr; ///< or null
   const Collider *collider = nullptr;     ///< or null
+  const Joint *joint = nullptr;           ///< or null: by its parent, or by its drive
+  bool drives = false;
 };
-/// Supports and constraints in one numbering, supports first.
+/// Supports, constraints and joints in one numbering, in this order.
 std::vector<Holder> movingHolders(const Scene &scene);
 /// Obstacles with each rod that may touch them.
 std::vector<Holder> movingObstacles(const Scene &scene);

@@ -21,6 +21,8 @@ enum class KeyType {
   index,   ///< a whole number from 0, or `last`
   rod,     ///< a name, a number from 0, or `all`
   rows,    ///< rows of a table
+  range,   ///< lower and upper bound
+  profile, ///< rows of time and value
   list,    ///< of maps
   map,
   word_or_map

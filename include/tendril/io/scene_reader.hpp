@@ -32,7 +32,8 @@ struct SceneFile {
   SceneSource source;
   RodNames names;
   std::set<std::string> constraint_names;
-  int constraint_blocks = 0, junction_blocks = 0;
+  std::set<std::string> joint_names;
+  int constraint_blocks = 0, junction_blocks = 0, joint_blocks = 0;
   std::map<std::pair<int, int>, std::string> joined; ///< vertices in junctions, by rod and number: which
   /// Numbers of supports by the rods and vertices that they hold.
   std::map<std::pair<int, int>, std::vector<int>> supports_at;

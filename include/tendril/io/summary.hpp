@@ -24,8 +24,10 @@ struct Summary {
   Extreme angle;                             ///< turning or twist between the edges at a vertex, cables left out [rad]
   std::vector<Vec3> force, moment;           ///< (ns) what each support does to its rod, see RodActions [N], [N m]
   std::vector<ConstraintReading> constraint; ///< (nc)
+  std::vector<JointReading> joint;           ///< (nj)
   Vec3 total_force = Vec3::Zero(),
-       total_moment = Vec3::Zero(); ///< of all supports and constraints, the moment about the origin [N], [N m]
+       total_moment = Vec3::Zero(); ///< of all supports, constraints and joints to the world, the moment about the
+                                    ///< origin [N], [N m]
 };
 
 /// \param load_factor on the loads of the scene

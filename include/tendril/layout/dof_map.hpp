@@ -48,12 +48,13 @@ public:
   std::span<const JoinedEdge> joinedEdges(RodSet rods) const { return joined_edges_.of(rods); }
   std::span<const Tie> ties(RodSet rods) const { return ties_.of(rods); }
   std::span<const JoinedBody> bodies(RodSet rods) const { return bodies_.of(rods); }
+  std::span<const BodyPair> pairs(RodSet rods) const { return pairs_.of(rods); }
   Joins joins(int rod) const {
     const RodSet one{rod, rod + 1};
-    return {joinedEdges(one), ties(one), bodies(one)};
+    return {joinedEdges(one), ties(one), bodies(one), pairs(one)};
   }
-  /// Calls visit(slot) for the slots beside rods that have unknowns or copies: frames of junctions, bodies, ends of
-  /// ties.
+  /// Calls visit(slot) for the slots beside rods that have unknowns, copies or sums of their own: frames of junctions,
+  /// bodies, ends of ties, parents of joints.
   template <class Visit> void forBeside(RodSet rods, Visit visit) const {
     for (const JoinedEdge &j : joinedEdges(rods)) visit(j.frame);
     for (const JoinedBody &b : bodies(rods)) {
@@ -63,6 +64,9 @@ public:
     for (const JoinedVertex &j : joinedVertices(rods))
       if (j.isOnBody()) visit(j.frame);
     for (const Tie &t : ties(rods)) visit(t.copy);
+    for (const BodyPair &p : pairs(rods))
+      for (const int k : {0, 1})
+        if (p.variables() > 6) visit(p.parent(k));
   }
   /// From the centre of mass of its body to a vertex, at the iterate [m].
   const Vec3 &arm(const JoinedVertex &j) const { return arms_[std::size_t(j.number)]; }
@@ -71,6 +75,7 @@ public:
   const ByRod<JoinedVertex> &joinedVertices() const { return joined_vertices_; }
   const ByRod<JoinedEdge> &joinedEdges() const { return joined_edges_; }
   const ByRod<JoinedBody> &bodies() const { return bodies_; }
+  const ByRod<BodyPair> &pairs() const { return pairs_; }
   int groups() const { return groups_; } ///< rigid ones of all junctions, and bodies
   Planes makePlanes() const { return Planes(slot_size, slots_); }
 
@@ -128,6 +133,7 @@ private:
   ByRod<JoinedEdge> joined_edges_;
   ByRod<Tie> ties_;
   ByRod<JoinedBody> bodies_;
+  ByRod<BodyPair> pairs_;
   std::vector<Vec3> arms_; ///< of joined vertices
   int groups_ = 0;
   std::vector<RodSet> islands_;  ///< per rod; empty where nothing joins any

@@ -21,7 +21,8 @@ inline constexpr int joined_entries = slot_entries + 3 * edge_size;
 /// The 32 or 44 entries of a slot are planes over the slots of a rod. Behind a ring, the copy of its first slot holds
 /// what the last edge has with the first; the other copies are added to what they stand for (fold). Of an edge that is
 /// joined to a frame, the frame's spin is the position at its slot, and what it has with the edge is `across` at the
-/// slot of the half cell, spin by edge. What a tie has is `vertex` at the slot of its copy.
+/// slot of the half cell, spin by edge. What a tie has is `vertex` at the slot of its copy;
+/// what a pair of bodies has stands at its own slots in rows.
 class EdgeBlocks {
 public:
   /// Planes of a slot's entries. Edge variables r, c in 0..3: e_x, e_y, e_z, twist.
@@ -35,6 +36,12 @@ public:
   static constexpr int joined(int r, int c) {
     return slot_entries + edge_size * r + c;
   } ///< r < 3 of the position of the vertex, c of the edge behind it
+
+  /// Entry i, j of a pair of bodies, i <= j over its variables (BodyPair): plane, and slot behind its first.
+  static constexpr std::pair<int, int> pair(int i, int j) {
+    const int n = 12 * i + j;
+    return {n % slot_entries, n / slot_entries};
+  }
 
   EdgeBlocks() = default;
   /// Of all rods, or of as many neighbours as so many slots hold.

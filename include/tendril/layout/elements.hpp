@@ -78,8 +78,17 @@ public:
   /// By the body's number in the scene.
   const JoinedBody &body(int b) const { return bodies_.items[place_of_body_[b]]; }
   int bodyCount() const { return int(body_mass_.size()); }
+  std::span<const BodyPair> pairs(RodSet set) const { return pairs_.of(set); }
+  /// By the joint's number in the scene.
+  const BodyPair &pairOf(int joint) const { return pairs_.items[place_of_joint_[joint]]; }
+  /// Of a body and the obstacles that it touches.
+  const BodyPair &pairOfBody(int body) const { return pairs_.items[place_of_contact_[body]]; }
   /// Of a body with what rods tied to it add, as drawn.
   const MassProperties &bodyMass(int body) const { return body_mass_[body]; }
+  /// Spin that belongs to an angular momentum, both in the axes as drawn [rad/s].
+  Vec3 spinOf(int body, const Vec3 &momentum) const { return inverse_inertia_[body] * momentum; }
+  /// Its radius of gyration, or its longest arm to what is tied to it [m].
+  double bodySize(int body) const { return body_size_[body]; }
   /// From the centre of mass of its body to a vertex, as drawn [m].
   const Vec3 &armAsDrawn(const JoinedVertex &j) const { return arm_[j.number]; }
   int vertices() const { return int(vertex_slot.size()); }
@@ -95,7 +104,11 @@ private:
   ByRod<JoinedVertex> joined_vertices_;
   ByRod<Tie> ties_;
   ByRod<JoinedBody> bodies_;
+  ByRod<BodyPair> pairs_;
+  std::vector<int> place_of_joint_, place_of_contact_; ///< of each joint, and of each body that touches, in pairs_
   std::vector<MassProperties> body_mass_;
+  std::vector<Mat3> inverse_inertia_;
+  std::vector<double> body_size_;
   std::vector<int> place_of_body_; ///< of each body in bodies_
   std::vector<Vec3> arm_;          ///< per joined vertex
   void weighBodies(const Scene &scene);

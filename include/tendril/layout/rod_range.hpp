@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <span>
+#include <utility>
 
 namespace tendril {
 
@@ -94,6 +95,28 @@ struct JoinedBody {
   int body, group; ///< of the scene; the number of its frame behind those of junctions
 };
 
+/// Two bodies, or one and the world, that a joint or obstacles hold, with slots beside the rod of the first for what is
+/// between them: from `first` on the forces that hold them (Configuration::axial_force), and their Hessian
+/// (EdgeBlocks::pair).
+struct BodyPair {
+  static constexpr int forces = 8, slots = forces + 2;
+  int rod, first;
+  int joint;             ///< of the scene; -1: obstacles, which have no forces of their own
+  int body;              ///< the first
+  std::array<int, 4> of; ///< slots of positions and rotations: of the child, then of the parent, or -1
+  int variables() const { return of[2] < 0 ? 6 : 12; }
+  /// Where what acts on the parent is summed, a force and a couple, before it goes to the parent's own slots; of a
+  /// parent that is the world, the first has its point and axes.
+  int parent(int k) const { return first + forces + k; }
+  /// Has the target of a drive for a position along x, and the coordinate at the start of a step as the winding.
+  int target() const { return parent(1); }
+  /// Where a variable stands: its slot and the component there. \param sums whether that of sums is meant
+  std::pair<int, int> place(int variable, bool sums = false) const {
+    const int k = variable / 3;
+    return {sums && k > 1 ? parent(k - 2) : of[k], variable % 3};
+  }
+};
+
 /// An edge beside a vertex in a group of a junction, tied to the frame of the group by a half cell. The frame that the
 /// half cell sees is that of the edge as drawn, turned as the group has turned, at a slot of its own. Its spin stands
 /// there as a position does elsewhere: an unknown at the first edge of the group, of which the others have copies.
@@ -120,6 +143,7 @@ struct Joins {
   std::span<const JoinedEdge> edges;
   std::span<const Tie> ties;
   std::span<const JoinedBody> bodies;
+  std::span<const BodyPair> pairs;
 };
 
 /// Unknowns of a slot: x, y, z, twist.

@@ -3,7 +3,7 @@
 /// Rigid bodies, their mass properties, and what ties rods to them.
 
 #include "tendril/geometry/mesh_distance.hpp"
-#include "tendril/model/motion.hpp"
+#include "tendril/model/contact.hpp"
 
 #include <memory>
 #include <string>
@@ -36,6 +36,9 @@ struct Body {
   std::string shape = "none"; ///< box, sphere, capsule, cylinder, mesh or none
   Vec3 size = Vec3::Zero();   ///< of a box its edges; else radius, length along z
   std::shared_ptr<const TriangleMesh> mesh;
+  /// With obstacles: `on`, a barrier of `distance` and a force of `stiffness` at each sample of its surface [N] (0: by
+  /// the loads), friction and damping.
+  ContactSettings contact = ContactSettings::none();
   Motion motion; ///< of one that goes as it is told, about its origin
   int rod = 0;   ///< the first that is tied to it, or any: they are solved together (Scene::hostBodies)
 };

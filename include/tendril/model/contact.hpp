@@ -37,6 +37,11 @@ struct ContactSettings {
   std::vector<int> passes; ///< obstacles that are not there for it
   int quadrature = 0;      ///< Gauss points of an edge; 0: vertices, and points between where obstacles curve
 
+  static ContactSettings none() {
+    ContactSettings settings;
+    settings.on = false;
+    return settings;
+  }
   bool isBarrier() const { return law == Law::barrier; }
   /// Distance from the surface of a shape that no motion passes [m]: of a penalty, short of where the axis of the rod,
   /// or without a radius the middle of the obstacle, would be passed.

@@ -5,6 +5,7 @@
 
 #include "tendril/model/body.hpp"
 #include "tendril/model/contact.hpp"
+#include "tendril/model/joint.hpp"
 #include "tendril/model/material.hpp"
 #include "tendril/model/strain.hpp"
 
@@ -138,7 +139,9 @@ struct Scene {
   std::vector<Body> bodies;      ///< that are free to move
   std::vector<Body> held_bodies; ///< those at rest, or that move as they are told: what is tied to them, supports hold
   std::vector<Attachment> attachments;
-  /// Gives every body its first rod, in the present order of rods.
+  std::vector<Joint> joints; ///< between bodies
+  /// Gives every body its first rod, in the present order of rods: one that is tied to it, or to what joints join it
+  /// to.
   void hostBodies();
   /// Whether junctions, ties or bodies join rods.
   bool isJoined() const;
@@ -171,6 +174,7 @@ struct Scene {
   bool collidersMove() const;
   /// The latest time up to another, later one until which all obstacles move evenly (Motion::evenUntil).
   double collidersEvenUntil(double from, double to) const;
+  bool touchesBody(int body) const { return !colliders.empty() && bodies[body].contact.on; }
   /// Whether a rod may touch anything.
   bool touches(int rod) const { return !colliders.empty() && rods[rod].contact.on; }
   /// Whether friction or damping acts on any.

@@ -85,6 +85,12 @@ public:
   /// Smallest distance between surfaces of some rods and obstacles at the iterate [m].
   double smallestGap(RodSet rods) const;
   double energy(const Configuration &configuration, RodSet rods) const;
+  /// See Term::violation.
+  double violation(const Configuration &configuration, int rod) const {
+    double sum = 0;
+    for (const auto &term : terms_) sum += term->violation(configuration, rod);
+    return sum;
+  }
   double energy(const Configuration &configuration) const { return energy(configuration, all()); }
   /// Room for the derivatives of some rods; those of others are forgotten. Derivatives of other rods need room for all.
   void focus(RodSet rods);
@@ -141,6 +147,10 @@ public:
   void holdObstacles(int rod, bool held) { obstacles_held_[rod] = held; }
   /// Axial forces of a trial, those that the linearised strains of an increment ask for.
   void setTrialForces(const Planes &increment, double scale, int rod, RetractionKind kind, Configuration &trial) const;
+  /// The same of terms that have forces of their own (Term::setTrialForces); until then they are those of the iterate.
+  void setTermForces(const Planes &increment, double scale, int rod, Configuration &trial) const {
+    for (const auto &term : terms_) term->setTrialForces(iterate_, increment, scale, rod, trial);
+  }
   /// Adds the forces of edges that a trial has made longer than an increment does to first order.
   /// \return by how much at most, over their lengths
   double addExcess(const Planes &increment, double scale, const Configuration &trial, int rod, Planes &force) const;
@@ -191,6 +201,8 @@ public:
     for (const JoinedBody &b : elements_.bodies({rod, rod + 1}))
       includeBody(elements_, b, step_, start_, iterate_, gradient(rod).equilibrium, scales_[rod].force,
                   bodyLoad(scene_, elements_, b.body), &residual);
+    for (const auto &term : terms_)
+      residual.compatibility = std::max(residual.compatibility, term->mismatch(iterate_, rod));
     return residual;
   }
   /// The largest of each over all rods.

@@ -2,6 +2,7 @@
 /// \file state.hpp
 /// What a run must remember between steps, and what is derived from it.
 
+#include "tendril/geometry/rotation.hpp"
 #include "tendril/layout/elements.hpp"
 
 #include <cstdint>
@@ -39,6 +40,13 @@ struct ContactMemory {
   auto key() const { return std::tuple(edge, collider, point); }
 };
 
+/// What a joint remembers.
+struct JointState {
+  std::array<double, BodyPair::forces> force{}; ///< of what it holds exactly, row by row (see coupling/joints.cpp)
+  double coordinate = 0;                        ///< with whole turns [m] or [rad]
+  bool operator==(const JointState &) const = default;
+};
+
 /// All that a checkpoint needs. Copied to be restored when a step fails.
 struct State {
   double time = 0;
@@ -55,10 +63,11 @@ struct State {
   std::vector<Vec3> body_position, body_position_low; ///< (nb) of the centres of mass, in two words [m]
   std::vector<BodyRate> body_rate;                    ///< (nb) velocities, spins and angular momenta
   std::vector<double>
-      winding;        ///< (cells) 2 pi x whole turns of the twist angle, carried by continuity (`angle` measure) [rad]
-  double last_dt = 0; ///< length of the step that led here; 0 where the integrator remembers nothing [s]
-  double dt_before = 0;      ///< of the step before that; 0 where there was none [s]
-  std::vector<Rates> memory; ///< what the integrator remembers of steps before
+      winding; ///< (cells) 2 pi x whole turns of the twist angle, carried by continuity (`angle` measure) [rad]
+  std::vector<JointState> joints; ///< (nj)
+  double last_dt = 0;             ///< length of the step that led here; 0 where the integrator remembers nothing [s]
+  double dt_before = 0;           ///< of the step before that; 0 where there was none [s]
+  std::vector<Rates> memory;      ///< what the integrator remembers of steps before
   std::vector<double>
       strains; ///< before the last step, as strainsOf, then before the one before; where the integrator wants them
   /// What supports, constraints and obstacles that move did at the end of the last step, then of the one before
@@ -107,12 +116,7 @@ public:
   Vec3 positionAt(int slot) const { return values_.vector(position, slot); }
   Frame frameAt(int slot) const { return frames<double>(slot); }
   /// Of a body, since it was drawn.
-  Mat3 rotationAt(int slot) const {
-    const Frame f = frameAt(slot);
-    Mat3 m;
-    m << f.tangent, f.director, f.secondDirector();
-    return m;
-  }
+  Mat3 rotationAt(int slot) const { return matrixOf(frameAt(slot)); }
   void setFrame(int slot, const Frame &f);
   /// Frames of a slot or of a pack of them.
   template <class T> FrameOf<T> frames(int slot) const {
@@ -171,6 +175,8 @@ Frame joinedFrame(const State &state, const Elements &elements, const JoinedEdge
 Frame supportFrame(const Support &support, double motion_time);
 /// Point or frame of a constraint, its target, into the configuration, at its slot.
 void setTarget(const Constraint &constraint, int slot, double motion_time, Configuration &c);
+/// Of a joint: the target of its drive, and where its parent is one that no step moves.
+void setTarget(const Joint &joint, const BodyPair &pair, double motion_time, Configuration &c);
 void setTargets(const Scene &scene, const Elements &elements, double motion_time, Configuration &c);
 
 /// Visits the cells of a rod: `visit(slot, frame0, frame1, count)`, as Packs of `count` regular cells, then one by one

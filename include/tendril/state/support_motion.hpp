@@ -1,7 +1,7 @@
 #pragma once
 /// \file support_motion.hpp
-/// Prescribed motion of supports and constraints within a step: frames of supports and targets of constraints go to its
-/// end at once, the vertices that supports hold with the iterations.
+/// Prescribed motion of supports and constraints within a step: frames of supports and targets of constraints and
+/// joints go to its end at once, the vertices that supports hold with the iterations.
 
 #include "tendril/state/state.hpp"
 
@@ -33,6 +33,7 @@ private:
   };
   std::vector<std::vector<int>> moving_;         ///< supports that move, per rod
   std::vector<std::vector<int>> moving_targets_; ///< constraints that move, per rod; empty where the scene has none
+  std::vector<int> moving_joints_;               ///< whose parents or drives move
   double from_time_ = 0, to_time_ = 0;           ///< of the turn under way
   std::vector<std::vector<Turned>> turned_;      ///< frames that turn in this step, per rod
   std::string beyond_barrier_;

@@ -104,7 +104,7 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
     of_body.translation = -force.vector(0, b.position) / all.mass;
     of_body.momentum = -force.vector(0, b.rotation);
     of_body.spin =
-        turned * all.inertia.ldlt().solve(turned.transpose() * (of_body.momentum - rate.spin.cross(rate.momentum)));
+        turned * elements.spinOf(b.body, turned.transpose() * (of_body.momentum - rate.spin.cross(rate.momentum)));
   }
   for (const JoinedVertex &j : joined) {
     if (!j.isOnBody() || !j.isVertex()) continue;

@@ -1,0 +1,258 @@
+#include "tendril/energy/joint.hpp"
+
+#include "tendril/energy/constraint.hpp"
+#include "tendril/state/spin_stage.hpp"
+
+namespace tendril {
+namespace {
+
+constexpr int child = 0, child_spin = 3, parent = 6, parent_spin = 9; // first variables
+
+/// s.w of a direction s of the parent and a vector w that turns with the child; and where `from_point`, w is that from
+/// the parent's centre of mass to the child's point, less what the parent's own point has. With ds = d x s the second
+/// derivatives by both spins d, e: (d x s).(e x b) = (d.e)(s.b) - (d.b)(e.s).
+JointRow product(const Vec3 &s, const Vec3 &w, const Vec3 &arm, bool from_point) {
+  JointRow row;
+  row.value = s.dot(w);
+  row.gradient.segment<3>(child_spin) = arm.cross(s);
+  row.gradient.segment<3>(parent_spin) = s.cross(w);
+  row.hessian.block<3, 3>(child_spin, child_spin) = curvatureOfArm(s, arm);
+  row.hessian.block<3, 3>(parent_spin, parent_spin) = curvatureOfArm(w, s);
+  row.hessian.block<3, 3>(child_spin, parent_spin) = s.dot(arm) * Mat3::Identity() - s * arm.transpose();
+  row.hessian.block<3, 3>(parent_spin, child_spin) = row.hessian.block<3, 3>(child_spin, parent_spin).transpose();
+  if (!from_point) return row;
+  row.gradient.segment<3>(child) = s;
+  row.gradient.segment<3>(parent) = -s;
+  const Mat3 turned = crossMatrix<double>(s);
+  for (const auto &[at, sign] : {std::pair(child, -1.0), std::pair(parent, 1.0)}) {
+    row.hessian.block<3, 3>(at, parent_spin) = sign * turned;
+    row.hessian.block<3, 3>(parent_spin, at) = sign * turned.transpose();
+  }
+  return row;
+}
+
+JointRow pointRow(const JointPlace &p, int k) {
+  const Vec3 s = p.parent_axes.col(k);
+  JointRow row = product(s, p.reach, p.arm, true);
+  row.value = s.dot(p.reach - p.parent_arm);
+  return row;
+}
+
+/// Cosine between an axis of the parent and one of the child.
+JointRow axesRow(const JointPlace &p, int k, int l) {
+  const Vec3 t = p.axes.col(l);
+  return product(p.parent_axes.col(k), t, t, false);
+}
+
+/// A function of two rows, by its first and second derivatives.
+JointRow composed(double value, const JointRow &u, const JointRow &v, double fu, double fv, double fuu, double fuv,
+                  double fvv) {
+  JointRow row;
+  row.value = value;
+  row.gradient = fu * u.gradient + fv * v.gradient;
+  const Mat12 mixed = u.gradient * v.gradient.transpose();
+  row.hessian = fu * u.hessian + fv * v.hessian + fuu * u.gradient * u.gradient.transpose() +
+                fvv * v.gradient * v.gradient.transpose() + fuv * (mixed + mixed.transpose());
+  return row;
+}
+
+double withTurns(const JointPlace &p, double principal) {
+  const double expected = p.before + p.parent_axes.col(2).dot(p.spun);
+  return principal + 2 * pi * std::round((expected - principal) / (2 * pi));
+}
+
+/// By which the child has turned about the parent's third axis: atan2 of what its first axis has along the parent's.
+JointRow turnRow(const JointPlace &p) {
+  const JointRow u = axesRow(p, 0, 0), v = axesRow(p, 1, 0);
+  const double x = u.value, y = v.value, q = x * x + y * y, q2 = q * q;
+  return composed(withTurns(p, std::atan2(y, x)), u, v, -y / q, x / q, 2 * x * y / q2, (y * y - x * x) / q2,
+                  -2 * x * y / q2);
+}
+
+/// Angle of the rotation of the child from the parent, from its cosine: of no use near zero, where no range ends.
+JointRow angleRow(const JointPlace &p) {
+  JointRow sum;
+  for (int k = 0; k < 3; ++k) {
+    const JointRow row = axesRow(p, k, k);
+    sum.value += 0.5 * row.value;
+    sum.gradient += 0.5 * row.gradient;
+    sum.hessian += 0.5 * row.hessian;
+  }
+  const double c = std::clamp(sum.value - 0.5, -1.0, 1.0), s = std::sqrt(std::max(1 - c * c, 1e-300));
+  JointRow row;
+  row.value = std::acos(c);
+  row.gradient = -sum.gradient / s;
+  row.hessian = -sum.hessian / s - (c / (s * s * s)) * sum.gradient * sum.gradient.transpose();
+  return row;
+}
+
+} // namespace
+
+/// A body at a configuration or state: its centre of mass in two words, its rotation since it was drawn, and what it
+/// has turned by since the step began.
+struct JointPose {
+  Vec3 high, low;
+  Mat3 turned;
+  Vec3 spun;
+};
+
+static JointPlace placeOf(const Joint &joint, const BodyPair &pair, const Elements &elements, const Configuration &c,
+                          const JointPose &own, const JointPose *of_parent) {
+  JointPlace p;
+  p.arm = own.turned * (joint.point - elements.bodyMass(joint.child).centre);
+  p.axes = own.turned * joint.axes;
+  p.spun = own.spun;
+  if (of_parent) {
+    p.reach = (own.high - of_parent->high) + (own.low - of_parent->low) + p.arm;
+    p.parent_arm = of_parent->turned * (joint.point - elements.bodyMass(joint.parent).centre);
+    p.parent_axes = of_parent->turned * joint.axes;
+    p.spun -= of_parent->spun;
+  } else {
+    p.reach = (own.high - c.positionAt(pair.parent(0))) + own.low + p.arm;
+    p.parent_arm = Vec3::Zero();
+    p.parent_axes = c.rotationAt(pair.parent(0));
+  }
+  p.drawn = c.positionAt(pair.target())[0];
+  p.before = c[Configuration::winding][pair.target()];
+  return p;
+}
+
+JointPlace placeOf(const Joint &joint, const BodyPair &pair, const Elements &elements, const Configuration &c) {
+  auto pose = [&](int k) {
+    const int at = pair.of[std::size_t(k)], turn = pair.of[std::size_t(k + 1)];
+    return JointPose{c.positionAt(at), c.values().vector(Configuration::position_low, at), c.rotationAt(turn),
+                     c.positionAt(turn)};
+  };
+  if (joint.parent < 0) return placeOf(joint, pair, elements, c, pose(0), nullptr);
+  const JointPose parent = pose(2);
+  return placeOf(joint, pair, elements, c, pose(0), &parent);
+}
+
+JointPlace placeOf(const Joint &joint, const BodyPair &pair, const Elements &elements, const State &state,
+                   const Configuration &c) {
+  auto pose = [&](int body) {
+    return JointPose{state.body_position[std::size_t(body)], state.body_position_low[std::size_t(body)],
+                     rotationOf(state, elements.body(body).group), Vec3::Zero()};
+  };
+  JointPlace place;
+  if (joint.parent < 0)
+    place = placeOf(joint, pair, elements, c, pose(joint.child), nullptr);
+  else {
+    const JointPose parent = pose(joint.parent);
+    place = placeOf(joint, pair, elements, c, pose(joint.child), &parent);
+  }
+  place.before = state.joints[std::size_t(pair.joint)].coordinate;
+  return place;
+}
+
+bool holds(const Joint &joint, int row) {
+  const Joint::Held held = joint.held();
+  switch (row) {
+  case 0:
+  case 1:
+    return held.across;
+  case 2:
+    return held.along;
+  case 3:
+  case 4:
+    return held.tilt;
+  case 5:
+    return held.turn;
+  }
+  return joint.driven || joint.hasRange();
+}
+
+JointRow jointRow(const Joint &joint, const JointPlace &place, int row) {
+  switch (row) {
+  case 0:
+  case 1:
+  case 2:
+    return pointRow(place, row);
+  case 3:
+  case 4:
+    return axesRow(place, row - 3, 2);
+  case 5:
+    return axesRow(place, 0, 1);
+  }
+  if (joint.type == Joint::Type::ball) return angleRow(place);
+  if (joint.held().turnsFreely() && !joint.held().slidesFreely()) return turnRow(place);
+  return joint.held().slidesFreely() ? pointRow(place, 2) : JointRow();
+}
+
+Rows jointValues(const Joint &joint, const JointPlace &place) {
+  Rows values = Rows::Zero();
+  for (int k = 0; k < joint_rows; ++k)
+    if (k == coordinate_row || holds(joint, k)) values[k] = jointRow(joint, place, k).value;
+  return values;
+}
+
+void JointLaw::addSprings(const Joint &joint, const Rows &values, double target) {
+  if (!joint.isExact()) {
+    Constraint spring{};
+    spring.stiffness = joint.stiffness;
+    spring.saturation = joint.saturation;
+    const Vec3 distance = values.head<3>();
+    const VectorDerivatives of_point = distanceDerivatives(spring, distance);
+    value += radialLaw(spring, distance.norm()).value;
+    slope.head<3>() += of_point.gradient;
+    curvature.topLeftCorner<3, 3>() += of_point.hessian;
+    for (int k = 3; k < coordinate_row; ++k) {
+      value += 0.5 * joint.rotational_stiffness * values[k] * values[k];
+      slope[k] += joint.rotational_stiffness * values[k];
+      curvature(k, k) += joint.rotational_stiffness;
+    }
+  }
+  auto add = [&](double stiffness, double off) {
+    value += 0.5 * stiffness * off * off;
+    slope[coordinate_row] += stiffness * off;
+    curvature(coordinate_row, coordinate_row) += stiffness;
+  };
+  const double q = values[coordinate_row];
+  if (joint.driven && joint.drive_stiffness >= 0) add(joint.drive_stiffness, q - target);
+  if (joint.range_stiffness >= 0 && q > joint.upper) add(joint.range_stiffness, q - joint.upper);
+  if (joint.range_stiffness >= 0 && q < joint.lower) add(joint.range_stiffness, q - joint.lower);
+}
+
+JointReading readJoint(const Scene &scene, const Elements &elements, int index, const State &state,
+                       const Configuration &c, bool dynamic) {
+  const Joint &joint = scene.joints[std::size_t(index)];
+  const BodyPair &pair = elements.pairOf(index);
+  const JointPlace place = placeOf(joint, pair, elements, c);
+  const Rows values = jointValues(joint, place);
+  std::array<JointRow, joint_rows> rows;
+  for (int k = 0; k < joint_rows; ++k) rows[std::size_t(k)] = jointRow(joint, place, k);
+  JointLaw law;
+  law.addSprings(joint, values, place.drawn);
+  JointReading out;
+  const auto &force = state.joints[std::size_t(index)].force;
+  out.drive =
+      joint.driven ? (joint.drive_stiffness < 0 ? force[6] : joint.drive_stiffness * (values[6] - place.drawn)) : 0;
+  for (int k = 0; k < joint_rows; ++k) law.slope[k] += force[std::size_t(k)];
+  law.slope[coordinate_row] += force[7];
+  if (dynamic && joint.dissipates()) {
+    Vec12 rate = Vec12::Zero();
+    const BodyRate &own = state.body_rate[std::size_t(joint.child)];
+    rate << own.translation, own.spin, Vec3::Zero(), Vec3::Zero();
+    if (joint.parent >= 0)
+      rate.tail<6>() << state.body_rate[std::size_t(joint.parent)].translation,
+          state.body_rate[std::size_t(joint.parent)].spin;
+    else
+      rate.tail<6>() << joint.motion.velocityAt(state.time), joint.motion.angularVelocityAt(state.time);
+    for (int k = 0; k < joint_rows; ++k) {
+      const double damping = k < 3 ? joint.damping : k < 6 ? joint.rotational_damping : joint.drive_damping;
+      double of_row = rows[std::size_t(k)].gradient.dot(rate);
+      if (k == coordinate_row) of_row -= joint.target_motion.velocityAt(state.time)[0];
+      if (holds(joint, k) && (k == coordinate_row ? joint.driven : !joint.isExact())) law.slope[k] += damping * of_row;
+      if (k == coordinate_row && joint.driven) out.drive += damping * of_row;
+    }
+  }
+  const Vec12 gradient = law.gradient(rows, law.slope);
+  out.coordinate = values[coordinate_row];
+  out.distance = place.reach - place.parent_arm;
+  out.force = -gradient.segment<3>(child);
+  out.moment = -gradient.segment<3>(child_spin) - place.arm.cross(out.force);
+  out.drive = -out.drive;
+  return out;
+}
+
+} // namespace tendril
