@@ -20,10 +20,11 @@ import numpy as np
 
 FORMATS = (1, 2)
 PLACES = ("vertices", "edges", "cells")
-ROWS = ("supports", "constraints", "colliders", "bodies", "joints")  # of fields that are not of rods
+ROWS = ("supports", "constraints", "colliders", "bodies", "attachments", "joints")  # of fields that are not of rods
 ON_DEMAND = ("curvature", "twist", "strain_energy_density", "force", "moment", "reaction", "reaction_moment",
              "constraint_deviation", "constraint_force", "contact_force", "collider_force", "collider_moment",
-             "joint_coordinate", "joint_distance", "joint_force", "joint_moment", "position_low")
+             "attachment_force", "attachment_moment", "joint_coordinate", "joint_distance", "joint_force",
+             "joint_moment", "position_low")
 
 # Place and unit of what is in files of format 1; later ones tell by themselves.
 FORMAT_1_FIELDS = {
@@ -102,7 +103,7 @@ def _open(path):
 
 
 class Field:
-    """A field of all rods, at `place`: vertices, edges, cells, supports, constraints, colliders, bodies or joints; indices read
+    """A field of all rods, at `place`: vertices, edges, cells, supports, constraints, colliders, bodies, attachments or joints; indices read
     from the file what they ask for.
 
     field[frame], field[first:last, vertex], numpy.asarray(field). Shape: (frames, n), or (frames, n, components).
@@ -649,7 +650,7 @@ class Trajectory:
         except ImportError:
             raise TendrilError("to_xarray needs xarray: apt-get install python3-xarray") from None
         dimension = {"vertices": "vertex", "edges": "edge", "cells": "cell", "supports": "support",
-                     "constraints": "constraint", "colliders": "collider", "bodies": "body", "joints": "joint"}
+                     "constraints": "constraint", "colliders": "collider", "bodies": "body", "attachments": "attachment", "joints": "joint"}
         variables = {}
         for name in self._fields:
             field = self.field(name)

@@ -29,7 +29,7 @@ public:
     const std::vector<int> &passes = settings().passes;
     for (int k = 0; k < int(scene.colliders.size()); ++k)
       if (std::find(passes.begin(), passes.end(), k) == passes.end()) met_.push_back(k);
-    if (settings().stiffness == 0) bearAsDrawn(elements.bodyMass(b).centre);
+    if (settings().stiffness == 0) bearAsDrawn(elements.bodyMass(b).centre, loadOf(scene, elements, b));
   }
   const ContactSettings &settings() const { return scene_.bodies[std::size_t(body_.body)].contact; }
   /// Energy of a sample, a force [N] in place of a force per length.
@@ -118,23 +118,36 @@ private:
   }
 
   /// What is drawn touching is not thrown off: all samples there bear the load together.
-  void bearAsDrawn(const Vec3 &centre) {
+  void bearAsDrawn(const Vec3 &centre, double load) {
     constexpr double least = 1e-3;
     double pressed = 0;
     visitNear(centre, Mat3::Identity(), 0, law_.reach(), [&](const Near &n) { pressed -= law_(n.distance).slope; });
-    const double load = law_.stiffness();
-    if (pressed > load && std::isfinite(pressed)) law_ = {settings(), load * std::max(load / pressed, least)};
+    if (pressed > load && std::isfinite(pressed))
+      law_ = {settings(), law_.stiffness() * std::max(load / pressed, least)};
   }
-  /// That presses on a sample where surfaces touch: the load of the body; of one without loads what stops it over its
-  /// size.
+  /// That presses on a sample where surfaces touch: the load of the body, or a part of what stops it at its first
+  /// velocity or that of an obstacle.
   static double forceOf(const Scene &scene, const Elements &elements, int b) {
     const Body &body = scene.bodies[std::size_t(b)];
     const double mass = elements.bodyMass(b).mass, size = elements.bodySize(b);
     if (body.contact.stiffness > 0) return body.contact.stiffness;
-    const double load =
-        (body.gravity ? mass * scene.gravity.norm() : 0) + body.force.norm() + body.torque.norm() / size;
-    const double speed = body.velocity.norm() + size * body.angular_velocity.norm();
-    return load > 0 ? load : mass * std::max(speed * speed / size, 1e-3 * size);
+    const double load = loadOf(scene, elements, b);
+    double speed = body.velocity.norm() + size * body.angular_velocity.norm();
+    for (const Collider &c : scene.colliders) speed = std::max(speed, fastest(c.motion, size + c.size.norm()));
+    constexpr double part = 0.1; // of what stops it within the barrier
+    return std::max({load, part * mass * speed * speed / body.contact.distance, 1e-3 * mass * size});
+  }
+  static double loadOf(const Scene &scene, const Elements &elements, int b) {
+    const Body &body = scene.bodies[std::size_t(b)];
+    return (body.gravity ? elements.bodyMass(b).mass * scene.gravity.norm() : 0) + body.force.norm() +
+           body.torque.norm() / elements.bodySize(b);
+  }
+  /// Of a point so far from what a motion turns about.
+  static double fastest(const Motion &motion, double arm) {
+    double most = motion.velocity.norm() + arm * motion.angular_velocity.norm();
+    for (const Motion::Key &k : motion.table)
+      most = std::max(most, motion.velocityAt(k.time).norm() + arm * motion.angularVelocityAt(k.time).norm());
+    return most;
   }
 };
 

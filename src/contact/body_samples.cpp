@@ -32,7 +32,14 @@ void addCylinder(double radius, double length, std::vector<BodySample> &out) {
       const double angle = 2 * pi * k / around;
       out.push_back({{radius * std::cos(angle), radius * std::sin(angle), z}});
     }
-  for (const double end : {-0.5, 0.5}) out.push_back({{0, 0, end * length}});
+  for (const double end : {-0.5, 0.5}) { // flat ends
+    out.push_back({{0, 0, end * length}});
+    for (int ring = 1; ring < parts; ++ring)
+      for (int k = 0; k < around / 2; ++k) {
+        const double angle = 4 * pi * k / around, r = radius * ring / parts;
+        out.push_back({{r * std::cos(angle), r * std::sin(angle), end * length}});
+      }
+  }
 }
 
 void addMesh(const TriangleMesh &mesh, std::vector<BodySample> &out) {

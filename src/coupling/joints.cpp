@@ -16,6 +16,8 @@ constexpr double epsilon = std::numeric_limits<double>::epsilon();
 /// By how much stiffer than what it holds an exact joint is between two updates of its forces: each takes the error of
 /// these down by as much.
 constexpr double stiffer = 1e6;
+/// And at most, than the softer of two bodies that are not alike: beyond, digits are lost.
+constexpr double stiffest = 1e9;
 /// Slots of forces of a drive and of an end of the range.
 constexpr int drive_force = 6, range_force = 7;
 
@@ -113,7 +115,7 @@ public:
       const JointPlace place = placeOf(joint, p, elements_, c);
       const Rows values = jointValues(joint, place);
       const Work &w = work_[std::size_t(p.joint)];
-      for (int k = 0; k < joint_rows; ++k)
+      for (int k = 0; k <= coordinate_row; ++k)
         if (const Equation e = equation(joint, w, k, values, place.drawn); e.exact)
           most = std::max(most, std::abs(e.off) / (isTurn(joint, k) ? 1 : w.size));
       if (const Equation e = rangeEquation(p, values); e.exact)
@@ -169,7 +171,7 @@ public:
       for (int k = 0; k < joint_rows; ++k)
         if (holds(joint, k)) values[k] += jointRow(joint, place, k).gradient.dot(moved);
       double *force = trial[Configuration::axial_force] + p.first;
-      for (int k = 0; k < joint_rows; ++k) {
+      for (int k = 0; k <= coordinate_row; ++k) {
         const Equation e = equation(joint, w, k, values, place.drawn);
         force[k] = w.force[std::size_t(k)] + (e.exact ? scale * e.stiffness * e.off : 0);
       }
@@ -279,22 +281,26 @@ private:
     return joint.parent < 0 ? size : std::min(size, elements_.bodySize(joint.parent));
   }
 
-  /// So much stiffer than inertia, and what else holds the softer of both bodies.
+  /// So much stiffer than inertia and what else holds both bodies.
   std::pair<double, double> stiffnessOf(const Joint &joint, const Step &step) const {
-    std::pair<double, double> least{HUGE_VAL, HUGE_VAL};
+    std::pair<double, double> least{HUGE_VAL, HUGE_VAL}, most{0, 0};
     for (const int body : {joint.child, joint.parent}) {
       if (body < 0) continue;
       const MassProperties &all = elements_.bodyMass(body);
       const Held &held = held_[std::size_t(body)];
       const double rate = step.isStatic() ? 0 : step.rule->mass / (step.dt * step.dt),
-                   spring = joint.driven ? std::max(joint.drive_stiffness, 0.0) : 0;
-      least.first = std::min(least.first, all.mass * rate + held.stiffness + spring);
-      least.second = std::min(least.second, all.inertia.trace() * rate + held.turning + spring);
+                   spring = joint.driven ? std::max(joint.drive_stiffness, 0.0) : 0,
+                   moving = all.mass * rate + held.stiffness + spring,
+                   turning = all.inertia.trace() * rate + held.turning + spring;
+      least = {std::min(least.first, moving), std::min(least.second, turning)};
+      most = {std::max(most.first, moving), std::max(most.second, turning)};
     }
     const Rod &host = scene_.rods[std::size_t(joint.rod)];
     const double any = host.material.axial_stiffness / host.length(), size = sizeOf(joint);
-    return {stiffer * (least.first > 0 ? least.first : any),
-            stiffer * (least.second > 0 ? least.second : any * size * size)};
+    auto between = [](double low, double high, double other) {
+      return high > 0 ? std::min(stiffer * high, stiffest * (low > 0 ? low : high)) : stiffer * other;
+    };
+    return {between(least.first, most.first, any), between(least.second, most.second, any * size * size)};
   }
 
   Equation equation(const Joint &joint, const Work &w, int k, const Rows &values, double target) const {
@@ -324,7 +330,7 @@ private:
       law.more[row] += e.stiffness * e.off;
       law.curvature(row, row) += e.stiffness;
     };
-    for (int k = 0; k < joint_rows; ++k) add(k, w.force[std::size_t(k)], equation(joint, w, k, values, target));
+    for (int k = 0; k <= coordinate_row; ++k) add(k, w.force[std::size_t(k)], equation(joint, w, k, values, target));
     const Equation range = rangeEquation(p, values);
     add(coordinate_row, w.force[range_force], range);
     if (!range.exact) law.value += 0.5 * range.stiffness * range.off * range.off;
@@ -347,6 +353,7 @@ private:
   }
   static double dampingOf(const Joint &joint, int row) {
     if (row == coordinate_row) return joint.driven ? joint.drive_damping : 0;
+    if (row == cosine_row) return 0;
     if (joint.isExact() || !holds(joint, row)) return 0;
     return row < 3 ? joint.damping : joint.rotational_damping;
   }

@@ -130,6 +130,17 @@ RodActions rodActions(const Scene &scene, const Elements &elements, const State 
         if (place.kind != CellPlace::before) out.force[place.edge1] += by_edge1;
         if (place.kind != CellPlace::before || place.at_end) out.moment[place.vertex] += cellMoment(f[0], f[1], k, d);
       });
+  for (const Attachment &a : scene.attachments) {
+    const Rod &rod = scene.rods[a.rod];
+    const RodRange &range = elements.rods[a.rod];
+    Vec3 force = Vec3::Zero(), moment = force;
+    if (const int after = rod.edgeAfter(a.vertex); after >= 0) force += out.force[range.first_edge + after];
+    if (const int before = rod.edgeBefore(a.vertex); before >= 0) force -= out.force[range.first_edge + before];
+    for (const JoinedEdge &j : elements.joinedEdges({a.rod, a.rod + 1}))
+      if (j.of_body && j.vertex == a.vertex) moment -= momentOn(elements, elements.cells(), c, a.rod, j.frame);
+    out.attachment.push_back(force);
+    out.attachment_moment.push_back(moment);
+  }
   for (std::size_t k = 0; k < scene.supports.size(); ++k) {
     const Support &support = scene.supports[k];
     if (const int frame = elements.support_slot[k]; frame >= 0)

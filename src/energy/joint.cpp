@@ -69,20 +69,27 @@ JointRow turnRow(const JointPlace &p) {
                   -2 * x * y / q2);
 }
 
-/// Angle of the rotation of the child from the parent, from its cosine: of no use near zero, where no range ends.
-JointRow angleRow(const JointPlace &p) {
+/// Cosine of the angle of the rotation of the child from the parent.
+JointRow rotationRow(const JointPlace &p) {
   JointRow sum;
+  sum.value = -0.5;
   for (int k = 0; k < 3; ++k) {
     const JointRow row = axesRow(p, k, k);
     sum.value += 0.5 * row.value;
     sum.gradient += 0.5 * row.gradient;
     sum.hessian += 0.5 * row.hessian;
   }
-  const double c = std::clamp(sum.value - 0.5, -1.0, 1.0), s = std::sqrt(std::max(1 - c * c, 1e-300));
+  return sum;
+}
+
+/// That angle: of no use near zero, where no range ends.
+JointRow angleRow(const JointPlace &p) {
+  const JointRow cosine = rotationRow(p);
+  const double c = std::clamp(cosine.value, -1.0, 1.0), s = std::sqrt(std::max(1 - c * c, 1e-300));
   JointRow row;
   row.value = std::acos(c);
-  row.gradient = -sum.gradient / s;
-  row.hessian = -sum.hessian / s - (c / (s * s * s)) * sum.gradient * sum.gradient.transpose();
+  row.gradient = -cosine.gradient / s;
+  row.hessian = -cosine.hessian / s - (c / (s * s * s)) * cosine.gradient * cosine.gradient.transpose();
   return row;
 }
 
@@ -159,6 +166,7 @@ bool holds(const Joint &joint, int row) {
   case 5:
     return held.turn;
   }
+  if (row == cosine_row) return !joint.isExact() && (held.tilt || held.turn);
   return joint.driven || joint.hasRange();
 }
 
@@ -173,6 +181,8 @@ JointRow jointRow(const Joint &joint, const JointPlace &place, int row) {
     return axesRow(place, row - 3, 2);
   case 5:
     return axesRow(place, 0, 1);
+  case cosine_row:
+    return joint.held().turn ? rotationRow(place) : axesRow(place, 2, 2);
   }
   if (joint.type == Joint::Type::ball) return angleRow(place);
   if (joint.held().turnsFreely() && !joint.held().slidesFreely()) return turnRow(place);
@@ -196,10 +206,15 @@ void JointLaw::addSprings(const Joint &joint, const Rows &values, double target)
     value += radialLaw(spring, distance.norm()).value;
     slope.head<3>() += of_point.gradient;
     curvature.topLeftCorner<3, 3>() += of_point.hessian;
-    for (int k = 3; k < coordinate_row; ++k) {
-      value += 0.5 * joint.rotational_stiffness * values[k] * values[k];
-      slope[k] += joint.rotational_stiffness * values[k];
-      curvature(k, k) += joint.rotational_stiffness;
+    if (holds(joint, cosine_row)) { // stiffness/2 times the square of the angle
+      const double c = std::clamp(values[cosine_row], -1.0, 1.0), angle = std::acos(c), sine = std::sin(angle),
+                   square = angle * angle;
+      const bool small = square < 1e-4; // by power series
+      value += 0.5 * joint.rotational_stiffness * square;
+      slope[cosine_row] -= joint.rotational_stiffness * (small ? 1 + square / 6 : angle / std::max(sine, 1e-9));
+      curvature(cosine_row, cosine_row) +=
+          joint.rotational_stiffness *
+          (small ? 1.0 / 3 + 2.0 / 15 * square : (sine - angle * c) / std::max(sine * sine * sine, 1e-27));
     }
   }
   auto add = [&](double stiffness, double off) {
@@ -211,6 +226,32 @@ void JointLaw::addSprings(const Joint &joint, const Rows &values, double target)
   if (joint.driven && joint.drive_stiffness >= 0) add(joint.drive_stiffness, q - target);
   if (joint.range_stiffness >= 0 && q > joint.upper) add(joint.range_stiffness, q - joint.upper);
   if (joint.range_stiffness >= 0 && q < joint.lower) add(joint.range_stiffness, q - joint.lower);
+}
+
+/// Velocities and spins of the child and the parent.
+static Vec12 ratesOf(const Joint &joint, const State &state) {
+  Vec12 rate;
+  const BodyRate &own = state.body_rate[std::size_t(joint.child)];
+  rate.head<6>() << own.translation, own.spin;
+  if (joint.parent >= 0)
+    rate.tail<6>() << state.body_rate[std::size_t(joint.parent)].translation,
+        state.body_rate[std::size_t(joint.parent)].spin;
+  else
+    rate.tail<6>() << joint.motion.velocityAt(state.time), joint.motion.angularVelocityAt(state.time);
+  return rate;
+}
+
+double tearingOf(const Scene &scene, const Elements &elements, int index, const State &state, const Configuration &c) {
+  const Joint &joint = scene.joints[std::size_t(index)];
+  if (joint.motion.moves()) return 0; // it begins to move with the first step
+  const JointPlace place = placeOf(joint, elements.pairOf(index), elements, c);
+  const Vec12 rate = ratesOf(joint, state);
+  double most = 0;
+  for (int k = 0; k < coordinate_row; ++k)
+    if (holds(joint, k))
+      most = std::max(most, std::abs(jointRow(joint, place, k).gradient.dot(rate)) *
+                                (k < 3 ? 1 : elements.bodySize(joint.child)));
+  return most;
 }
 
 JointReading readJoint(const Scene &scene, const Elements &elements, int index, const State &state,
@@ -227,18 +268,11 @@ JointReading readJoint(const Scene &scene, const Elements &elements, int index, 
   const auto &force = state.joints[std::size_t(index)].force;
   out.drive =
       joint.driven ? (joint.drive_stiffness < 0 ? force[6] : joint.drive_stiffness * (values[6] - place.drawn)) : 0;
-  for (int k = 0; k < joint_rows; ++k) law.slope[k] += force[std::size_t(k)];
+  for (int k = 0; k <= coordinate_row; ++k) law.slope[k] += force[std::size_t(k)];
   law.slope[coordinate_row] += force[7];
   if (dynamic && joint.dissipates()) {
-    Vec12 rate = Vec12::Zero();
-    const BodyRate &own = state.body_rate[std::size_t(joint.child)];
-    rate << own.translation, own.spin, Vec3::Zero(), Vec3::Zero();
-    if (joint.parent >= 0)
-      rate.tail<6>() << state.body_rate[std::size_t(joint.parent)].translation,
-          state.body_rate[std::size_t(joint.parent)].spin;
-    else
-      rate.tail<6>() << joint.motion.velocityAt(state.time), joint.motion.angularVelocityAt(state.time);
-    for (int k = 0; k < joint_rows; ++k) {
+    const Vec12 rate = ratesOf(joint, state);
+    for (int k = 0; k <= coordinate_row; ++k) {
       const double damping = k < 3 ? joint.damping : k < 6 ? joint.rotational_damping : joint.drive_damping;
       double of_row = rows[std::size_t(k)].gradient.dot(rate);
       if (k == coordinate_row) of_row -= joint.target_motion.velocityAt(state.time)[0];

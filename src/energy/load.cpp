@@ -173,8 +173,11 @@ double loadScale(const Scene &scene, const Elements &elements, int r, double len
                        [&](int k) { return scene.supports[k].vertex == vertex && scene.supports[k].holdsPosition(); });
   };
   std::map<int, Vec3> force; // per vertex: forces that cancel are none
-  for (const int k : elements.forcesOf(r))
-    force.try_emplace(scene.forces[k].vertex, Vec3::Zero()).first->second += scene.forces[k].force;
+  for (const int k : elements.forcesOf(r)) {
+    const NodalForce &f = scene.forces[k];
+    Vec3 &sum = force.try_emplace(f.vertex, Vec3::Zero()).first->second += f.force;
+    if (rod.gravity) sum += f.mass * scene.gravity;
+  }
   for (const auto &[vertex, f] : force)
     if (!held(vertex)) s += f.norm();
   for (const int k : elements.momentsOf(r))

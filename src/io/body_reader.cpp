@@ -78,6 +78,7 @@ std::string readBodyName(YamlMap &map, const SceneFile &file) {
   const std::string name = given ? readName(map.at("bodies[].name")) : "body" + std::to_string(file.bodies.size());
   if (given && name.find_first_not_of("0123456789") == std::string::npos)
     map.at("bodies[].name").fail("'name' must not be a number, by which bodies are counted, found '" + name + "'");
+  if (name == "world") map.at("bodies[].name").fail("'name' must not be world, which is what stands still");
   if (file.body_numbers.count(name))
     (given ? map.at("bodies[].name") : map.value())
         .fail("a body with the name '" + name + "' is there already; " +
@@ -117,7 +118,7 @@ MassProperties readMass(YamlMap &map, const std::string &shape, MassProperties s
   if (!shaped && !turned) {
     map.refuseUnknown();
     value.fail("a body of 'mass' alone is a point, which nothing can turn; give it a shape (" +
-               std::string(shape_names) + ") or an 'inertia'");
+               std::string(shape_names) + ") or an 'inertia', or write {vertex: ..., mass: ...} among the 'loads'");
   }
   const YamlValue says = map.at(dense ? AnyKey("bodies[].density") : AnyKey("bodies[].mass"));
   if (shaped && !(solid.mass > 0 && std::isfinite(solid.mass)))
@@ -272,6 +273,10 @@ static void readContact(YamlMap &map, const ContactSettings &of_scene, Body &bod
   read("bodies[].contact.fall_off_velocity", contact.fall_off_velocity);
   read("bodies[].contact.tangential_damping", contact.tangential_damping);
   read("bodies[].contact.normal_damping", contact.normal_damping);
+  if (const double size = std::sqrt(body.own.inertia.trace() / body.own.mass); contact.distance > size)
+    block.at("bodies[].contact.distance")
+        .fail("the 'distance' of its contact, " + shortText(contact.distance) +
+              " m, must not exceed the body's radius of gyration, " + shortText(size) + " m");
   block.finish();
 }
 
@@ -310,7 +315,7 @@ void readBody(const YamlValue &value, const ContactSettings &contact, SceneFile 
     body.motion = readMotion(motion, motion_keys);
   }
   for (const AnyKey key : {AnyKey("bodies[].velocity"), AnyKey("bodies[].angular_velocity"), AnyKey("bodies[].force"),
-                           AnyKey("bodies[].torque")})
+                           AnyKey("bodies[].torque"), AnyKey("bodies[].contact")})
     if (held && map.has(key))
       map.at(key).fail("'" + std::string(key->name()) +
                        "' has no meaning for a body that is 'fixed' or goes by its "

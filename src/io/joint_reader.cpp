@@ -93,6 +93,7 @@ void readRange(YamlMap &map, const std::string &coordinate, Joint &joint) {
     if (joint.lower != 0 || joint.upper > pi)
       value.fail("the 'range' of a ball is [0, upper], of " + coordinate + " from how it is drawn, at most pi");
     joint.lower = -HUGE_VAL;
+    if (joint.upper < 0.01) value.fail("the 'range' of a ball must be 0.01 rad or more; less is 'type: fixed'");
   }
   if (joint.lower > 0 || joint.upper < 0)
     value.fail("'range' must hold 0: " + coordinate + " as drawn; draw the bodies within it");

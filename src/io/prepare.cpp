@@ -59,6 +59,23 @@ void requireHeld(const Scene &scene) {
 
 } // namespace
 
+void refuseTearing(const Simulation &run) {
+  const Scene &scene = run.scene;
+  const Configuration c = configurationOf(run.state, scene, *run.elements, run.state.time);
+  for (int k = 0; k < int(scene.joints.size()); ++k) {
+    const Joint &joint = scene.joints[std::size_t(k)];
+    if (!joint.isExact()) continue;
+    const double apart = tearingOf(scene, *run.elements, k, run.state, c);
+    const BodyRate &rate = run.state.body_rate[std::size_t(joint.child)];
+    const double size = run.elements->bodySize(joint.child);
+    if (apart > 1e-6 * (rate.translation.norm() + size * rate.spin.norm()) && apart > 1e-9 * size)
+      throw SceneError("joint '" + joint.name + "': body '" + scene.bodies[std::size_t(joint.child)].name +
+                       "' moves away from it by " + shortText(apart) +
+                       " m/s at the start, which an exact joint cannot let it; its 'velocity' is that of its centre of "
+                       "mass: of a body that turns about a point, angular_velocity x (centre - point)");
+  }
+}
+
 void refuseOverlaps(const Simulation &run) {
   const Scene &scene = run.scene;
   const Configuration drawn = configurationOf(run.state, scene, *run.elements, run.state.time);
@@ -126,6 +143,16 @@ void refuseWithObstacles(const Options &o) {
                    (arc ? "take load steps" : "compare runs with -rod_edges, and with other values of -dt"));
 }
 
+/// Impacts of bodies are sudden: methods that remember velocities throw them back with more.
+void tellOfImpacts(const Scene &scene, const Options &o, std::vector<std::string> *notes) {
+  const std::string &name = o.loop.integrator.name;
+  for (int b = 0; b < int(scene.bodies.size()); ++b)
+    if (o.loop.dynamic && name != "euler" && scene.touchesBody(b))
+      return notes->push_back("warning: -integrator " + name + " throws bodies, as '" + scene.bodies[b].name +
+                              "', back from obstacles by more or less than they have come with; euler does not, nor "
+                              "does 'contact: {normal_damping: ...}' in short steps");
+}
+
 /// Friction of bodies is taken anew with every step, and in statics nothing would hold it.
 void refuseFrictionOfBodies(const Scene &scene, const Options &o) {
   for (int b = 0; b < int(scene.bodies.size()); ++b)
@@ -135,17 +162,25 @@ void refuseFrictionOfBodies(const Scene &scene, const Options &o) {
                        "{friction: 0}' in its block, or take -mode dynamic");
 }
 
-/// Methods whose stages do not end with their steps hold joints exactly in the middle only, whose forces swing then.
+/// Methods whose stages do not end with their steps hold joints exactly within them only, and their forces swing.
 void refuseWithJoints(const Scene &scene, Options &o, std::vector<std::string> *notes) {
   const std::string &name = o.loop.integrator.name;
   const auto exact = std::find_if(scene.joints.begin(), scene.joints.end(), [](const Joint &j) {
     return j.isExact() || (j.driven && j.drive_stiffness < 0) || (j.hasRange() && j.range_stiffness < 0);
   });
   if (!o.loop.dynamic || exact == scene.joints.end()) return;
-  if (name == "midpoint" || name == "symplectic2" || name == "energy_momentum")
-    throw SceneError("option -integrator " + name + ": holds joint '" + exact->name +
-                     "', which is exact, in the middle of steps only; take bdf2 or generalized_alpha, or give the "
+  if (name == "midpoint" || name == "symplectic2" || name == "energy_momentum" || name == "sdirk23")
+    throw SceneError("option -integrator " + name + ": does not hold joint '" + exact->name +
+                     "', which is exact, at the ends of its steps; take bdf2 or generalized_alpha, or give the "
                      "joint (its drive, its range) a stiffness");
+  for (const Joint &j : scene.joints)
+    if (j.hasRange() && j.range_stiffness < 0 && name != "euler")
+      throw SceneError("option -integrator " + name + ": joint '" + j.name +
+                       "' has an exact 'range', whose end would throw it back by what the method remembers of its "
+                       "velocity; take euler, or give a 'range_stiffness'");
+  if (name == "generalized_alpha")
+    notes->push_back("warning: -integrator generalized_alpha gains energy with exact joints, as '" + exact->name +
+                     "', in steps that do not resolve their motion; bdf2 does not");
   if (name.rfind("sdirk", 0) == 0)
     notes->push_back("warning: -integrator " + name + " is of first order with exact joints, as '" + exact->name +
                      "'; bdf2 and generalized_alpha keep their second order");
@@ -191,6 +226,7 @@ void makeReady(Scene scene, const Options &o, Prepared &prepared) {
   });
   world.together([&] {
     if (!run) return;
+    if (team.leads() && o.loop.dynamic && o.restart.empty()) refuseTearing(prepared.whole());
     if (team.leads() && !prepared.whole().scene.colliders.empty() && o.restart.empty())
       refuseOverlaps(prepared.whole());
     guarded([&] { return run->solver.rehearse(run->state, TimeLoop::stepOf(o.loop, run->state, o.loop.dt)); });
@@ -232,6 +268,7 @@ static Scene sceneFor(Prepared &prepared, Options &o) {
   if (!file.scene.colliders.empty()) refuseWithObstacles(o);
   refuseWithJoints(file.scene, o, &prepared.notes);
   refuseFrictionOfBodies(file.scene, o);
+  tellOfImpacts(file.scene, o, &prepared.notes);
   if (o.accuracy && file.scene.isJoined())
     throw SceneError("option -accuracy: chooses the edges of each rod by itself, and is not for rods that 'junctions', "
                      "'bodies' or 'constraints' join yet; compare runs with -rod_edges, or take -error_estimate");

@@ -289,6 +289,8 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
   for (const Collider &c : scene.colliders) add(Kind::scene, "collider '" + c.name + "'", textOf(c));
   for (const Rod &rod : scene.rods)
     if (!scene.colliders.empty()) add(Kind::scene, "contact of rod '" + rod.name + "'", textOf(rod.contact));
+  for (const NodalForce &f : scene.forces)
+    if (f.mass > 0) add(Kind::scene, at("mass on vertex ", f.vertex, f.rod), textOf(f.mass));
   for (const NodalForce &f : scene.forces) add(Kind::load, at("force on vertex ", f.vertex, f.rod), textOf(f.force));
   for (const EdgeMoment &m : scene.moments) {
     if (m.torque != 0) add(Kind::load, at("torque on edge ", m.edge, m.rod), textOf(m.torque));

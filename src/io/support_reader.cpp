@@ -159,9 +159,11 @@ void readLoad(const YamlValue &value, SceneFile &out) {
   bool warned = false;
   for (const int r : readTargets(map, "loads[].rod", out.names)) {
     const Rod &rod = scene.rods[r];
-    if (map.has("loads[].force")) {
-      const NodalForce &load = scene.forces.emplace_back(r, readIndex(map, "loads[].vertex", rod.vertices(), rod.name),
-                                                         map.vector("loads[].force"));
+    if (map.has("loads[].force") || map.has("loads[].mass")) {
+      NodalForce &load =
+          scene.forces.emplace_back(r, readIndex(map, "loads[].vertex", rod.vertices(), rod.name), Vec3::Zero());
+      if (map.has("loads[].force")) load.force = map.vector("loads[].force");
+      if (map.has("loads[].mass")) load.mass = map.number("loads[].mass");
       const auto at = out.supports_at.find({r, load.vertex});
       const bool held = at != out.supports_at.end() && std::any_of(at->second.begin(), at->second.end(), [&](int k) {
                           return scene.supports[k].holdsPosition();
@@ -178,7 +180,7 @@ void readLoad(const YamlValue &value, SceneFile &out) {
       if (map.has("loads[].moment")) m.moment = map.vector("loads[].moment");
       scene.moments.push_back(m);
     } else
-      value.fail("a load needs 'vertex' and 'force', or 'edge' and 'torque' or 'moment'");
+      value.fail("a load needs 'vertex' and 'force' or 'mass', or 'edge' and 'torque' or 'moment'");
   }
   map.finish();
 }

@@ -12,9 +12,9 @@
 namespace tendril {
 namespace {
 
-enum class On { vertices, edges, cells, supports, constraints, colliders, bodies, joints };
-constexpr const char *places[] = {"vertices",    "edges",     "cells",  "supports",
-                                  "constraints", "colliders", "bodies", "joints"};
+enum class On { vertices, edges, cells, supports, constraints, colliders, bodies, attachments, joints };
+constexpr const char *places[] = {"vertices",  "edges",  "cells",       "supports", "constraints",
+                                  "colliders", "bodies", "attachments", "joints"};
 
 /// Bodies by their origins and axes: places, quaternions, velocities, spins, and angular momenta about the centres of
 /// mass.
@@ -76,6 +76,11 @@ const Field fields[] = {
      [](const Snapshot &s) { return s.collider_force[0].data(); }},
     {"collider_moment", "N m", On::colliders, 3, From::contact,
      [](const Snapshot &s) { return s.collider_moment[0].data(); }},
+    // On bodies, where rods are tied to them exactly; the moment about the vertex.
+    {"attachment_force", "N", On::attachments, 3, From::actions,
+     [](const Snapshot &s) { return s.actions.attachment[0].data(); }},
+    {"attachment_moment", "N m", On::attachments, 3, From::actions,
+     [](const Snapshot &s) { return s.actions.attachment_moment[0].data(); }},
     // By how much the child is from the parent, and what acts on it: at the joint's point.
     {"joint_coordinate", "m, rad", On::joints, 1, From::actions,
      [](const Snapshot &s) { return s.joint_coordinate.data(); }},
@@ -150,6 +155,7 @@ std::array<int, std::size(places)> sizes(const Scene &scene, const Elements &e) 
           int(e.constraint_slot.size()),
           int(scene.colliders.size()),
           int(scene.bodies.size() + scene.held_bodies.size()),
+          int(scene.attachments.size()),
           int(scene.joints.size())};
 }
 
@@ -190,7 +196,7 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
     if ((f.source == From::contact && scene.colliders.empty()) || (f.source == From::motion && !scene.collidersMove()))
       continue;
     std::vector<hsize_t> slab{hsize_t(sizes(scene, elements)[std::size_t(f.place)])};
-    if (slab[0] == 0) continue; // cables have no cells, free rods no supports, constraints, bodies or joints
+    if (slab[0] == 0) continue; // cables have no cells, free rods no supports, constraints or bodies
     if (f.components > 1) slab.push_back(f.components);
     state_.back() = std::make_unique<Hdf5Series>(file_, std::string("state/") + f.name, slab);
     file_.writeAttribute(std::string("state/") + f.name, "unit", std::string(f.unit));

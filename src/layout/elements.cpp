@@ -208,6 +208,7 @@ Elements::Elements(const Scene &scene, const DofMap &dofs)
       mass[slot] += 0.5 * rod.material.linear_density * length;
       mass[range.slot(rod.next(i))] += 0.5 * rod.material.linear_density * length;
     }
+    for (const int k : forcesOf(int(r))) mass[range.slot(scene.forces[k].vertex)] += scene.forces[k].mass;
     if (range.twist) {
       CellBuilder builder(scene, int(r), *this);
       builder.build();

@@ -14,7 +14,9 @@ bool same(const Support &a, const Support &b) {
                                            (a.frame.director - b.frame.director).norm() < rounding));
 }
 
-bool same(const NodalForce &a, const NodalForce &b) { return a.vertex == b.vertex && a.force == b.force; }
+bool same(const NodalForce &a, const NodalForce &b) {
+  return a.vertex == b.vertex && a.force == b.force && a.mass == b.mass;
+}
 
 bool same(const EdgeMoment &a, const EdgeMoment &b) {
   return a.edge == b.edge && a.torque == b.torque && a.moment == b.moment;

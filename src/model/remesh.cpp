@@ -344,7 +344,8 @@ Scene remesh(const Scene &written, const std::vector<Drawing> &drawings, const s
     }
   }
   for (const NodalForce &f : written.forces)
-    scene.forces.push_back({f.rod, movedVertex(written.rods[f.rod], drawings[f.rod], f.vertex, edges[f.rod]), f.force});
+    scene.forces.push_back(
+        {f.rod, movedVertex(written.rods[f.rod], drawings[f.rod], f.vertex, edges[f.rod]), f.force, f.mass});
   for (const EdgeMoment &m : written.moments) addCouple(written, drawings[m.rod], m, edges[m.rod], scene.moments);
   return scene;
 }

@@ -104,7 +104,7 @@ struct Coarse {
         scene.constraints.push_back(c);
       }
     for (const NodalForce &f : from.forces)
-      if (isHere(f.rod)) scene.forces.push_back({f.rod - rods.begin, at(f.rod, f.vertex), f.force});
+      if (isHere(f.rod)) scene.forces.push_back({f.rod - rods.begin, at(f.rod, f.vertex), f.force, f.mass});
     for (const EdgeMoment &m : from.moments)
       if (isHere(m.rod)) scene.moments.push_back({m.rod - rods.begin, at(m.rod, m.edge), m.torque, m.moment});
   }

@@ -1,5 +1,6 @@
 #include "tendril/solver/imbalance.hpp"
 
+#include "tendril/energy/joint.hpp"
 #include "tendril/solver/newton.hpp"
 
 #include <cmath>
@@ -82,7 +83,43 @@ int farthestRod(IncrementalPotential &potential, RodSet rods, const Asked &asked
   return farthest;
 }
 
+/// The body beside a rod that is farthest out of balance, where none of the rod's own is farther; and the exact joint
+/// that is farthest off. Empty where it is the rod.
+static std::string tellBodies(IncrementalPotential &potential, int r, const Asked &asked) {
+  const Elements &elements = potential.elements();
+  const Scene &scene = potential.scene();
+  std::ostringstream text;
+  text << std::setprecision(3);
+  const Residual all = residualOf(potential, r);
+  double most = 0;
+  for (const JoinedBody &b : elements.bodies({r, r + 1})) {
+    Residual own;
+    includeBody(elements, b, potential.step(), potential.start(), potential.iterate(),
+                potential.gradient(r).equilibrium, potential.forceScale(r), bodyLoad(scene, elements, b.body), &own);
+    const double here = std::max(own.force, own.moment);
+    if (here <= most || here < 0.999 * std::max(all.force, all.moment) || here <= asked.rtol) continue;
+    most = here;
+    text.str("");
+    text << "; body '" << scene.bodies[b.body].name << "': forces and moments out of balance by " << here
+         << " of its load, or of what deforms its rod (asked: " << asked.rtol << ", -snes_rtol)";
+  }
+  double apart = 0;
+  const Joint *off = nullptr;
+  for (const BodyPair &p : elements.pairs({r, r + 1})) {
+    if (p.joint < 0 || !scene.joints[p.joint].isExact()) continue;
+    const JointPlace place = placeOf(scene.joints[p.joint], p, elements, potential.iterate());
+    const Rows values = jointValues(scene.joints[p.joint], place);
+    const double here = values.head<coordinate_row>().cwiseAbs().maxCoeff();
+    if (here > apart) apart = here, off = &scene.joints[p.joint];
+  }
+  if (off && apart > 1e-6 * elements.bodySize(off->child))
+    text << "; joint '" << off->name << "' is off by " << apart << " m or rad";
+  return text.str();
+}
+
 std::string tellImbalance(IncrementalPotential &potential, int rod, const Asked &asked) {
+  if (rod >= 0)
+    if (const std::string of_bodies = tellBodies(potential, rod, asked); !of_bodies.empty()) return of_bodies;
   const std::string what = rod < 0 ? "" : imbalanceOf(potential, rod, asked);
   return what.empty() ? "" : "; " + labelOf(potential.scene().rods[rod]) + ": " + what;
 }

@@ -90,6 +90,8 @@ bool NewtonSolver::isLittle(int r, double *size) {
   const IncrementalPotential::RodEnergy &energy = energyAtIterate(r);
   const double cost = std::abs(work_->standstill[r].energy);
   *size = sizeOf(r, work_->increment);
+  constexpr double apart = 1e-8; // of exact joints, over the size of their bodies
+  if (!potential_->elements().pairs({r, r + 1}).empty() && !(work_->residual[r].compatibility <= apart)) return false;
   if (potential_->scene().touches(r) && !(potential_->changeOfPressure(r, work_->increment) <= tolerance)) return false;
   if (*size <= 256 * epsilon * std::max(1.0, energy.reach / potential_->length(r)))
     return true; // soft turns carry the rounding of many edges
@@ -184,8 +186,7 @@ PetscErrorCode NewtonSolver::verify(bool *little) {
     double size;
     double &energy = work_->standstill[r].energy = dot(potential_->elements().rods[r], gradient, work_->increment);
     for (const JoinedBody &b : potential_->elements().bodies({r, r + 1}))
-      for (const int s : {b.position, b.rotation})
-        energy += gradient.vector(0, s).dot(work_->increment.vector(0, s));
+      for (const int s : {b.position, b.rotation}) energy += gradient.vector(0, s).dot(work_->increment.vector(0, s));
     const bool here = isLittle(r, &size);
     if (here) work_->left[r] = std::max(work_->left[r], size);
     if ((here || isNeutral(r)) && (work_->zero[r] == 0 || isBalanced(r, rtol))) continue;

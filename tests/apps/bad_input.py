@@ -107,6 +107,12 @@ def bodies(text, ties="", more=""):
     return (support, f"{support}\nbodies: [{text}]\nconstraints: [{ties}]{more}")
 
 
+def joints(text):
+    """A free body and one that stays, with joints."""
+    wall = "{name: wall, box: {size: [1, 1, 1]}, density: 1, position: [9, 9, 9], fixed: true}"
+    return bodies(f"{cube}, {wall}", "", f"\njoints: [{text}]")
+
+
 cube = "{name: cube, box: {size: [0.2, 0.2, 0.2]}, density: 1000}"
 
 
@@ -218,6 +224,53 @@ rows = [
     ("accuracy of rods that pins join", (support, support + "\nconstraints: [{type: pin, vertex: 4, to: {vertex: 1}, stiffness: 1}]"), ["-mode", "static", "-accuracy", "1e-3"], ["-accuracy", "join"]),
     ("rods that pins join, one by one", (support, support + "\nconstraints: [{type: pin, vertex: 4, to: {vertex: 1}, stiffness: 1}]"), ["-pc_factor_mat_solver_type", "banded"], ["-pc_factor_mat_solver_type", "woodbury"]),
     ("unknown key of a constraint", (support, support + "\nconstraints: [{type: pin, vertex: 4, stifness: 1}]"), [], ["scene.yaml:9", "stiffness"]),
+    # joints between bodies
+    ("joint of no type", joints("{child: cube}"), [], ["scene.yaml:11", "needs the key 'type'"]),
+    ("joint of an unknown type", joints("{type: hing, child: cube}"), [], ["scene.yaml:11", "'hing'", "hinge"]),
+    ("joint without a child", joints("{type: ball}"), [], ["scene.yaml:11", "needs the key 'child'"]),
+    ("misspelt key of a joint", joints("{type: ball, chid: cube}"), [], ["scene.yaml:11", "unknown key 'chid'", "did you mean 'child'"]),
+    ("joint of an unknown body", joints("{type: ball, child: cub}"), [], ["scene.yaml:11", "no body 'cub'", "did you mean 'cube'"]),
+    ("joint to an unknown body", joints("{type: ball, child: cube, parent: wold}"), [], ["scene.yaml:11", "no body 'wold'"]),
+    ("joint of a body with itself", joints("{type: ball, child: cube, parent: 0}"), [], ["scene.yaml:11", "both sides of the joint are body 'cube'"]),
+    ("joint of a body that stays", joints("{type: ball, child: wall, parent: cube}"), [], ["scene.yaml:11", "'wall' is 'fixed'", "make it the 'parent'"]),
+    ("joint of what stays with the world", joints("{type: ball, child: wall}"), [], ["scene.yaml:11", "nothing here can move"]),
+    ("joints named twice", joints("{name: a, type: ball, child: cube}, {name: a, type: ball, child: cube}"), [], ["scene.yaml:11", "name 'a' is there already"]),
+    ("axis of a ball", joints("{type: ball, child: cube, axis: [1, 0, 0]}"), [], ["scene.yaml:11", "'type: ball' has no 'axis'"]),
+    ("hinge about nothing", joints("{type: hinge, child: cube, axis: [0, 0, 0]}"), [], ["scene.yaml:11", "'axis' must not be zero"]),
+    ("hinge that gives way in its point only", joints("{type: hinge, child: cube, stiffness: 1e3}"), [], ["scene.yaml:11", "'rotational_stiffness'", "is missing beside 'stiffness'"]),
+    ("hinge that gives way in its turns only", joints("{type: hinge, child: cube, rotational_stiffness: 1e3}"), [], ["scene.yaml:11", "'stiffness'", "is missing beside 'rotational_stiffness'"]),
+    ("turns of a ball by springs", joints("{type: ball, child: cube, stiffness: 1, rotational_stiffness: 1}"), [], ["scene.yaml:11", "leaves all turns free"]),
+    ("joint of negative stiffness", joints("{type: ball, child: cube, stiffness: -1}"), [], ["scene.yaml:11", "'stiffness' must be greater than zero"]),
+    ("damping of an exact joint", joints("{type: ball, child: cube, damping: 1}"), [], ["scene.yaml:11", "'damping' is for a joint made of springs"]),
+    ("saturation of nothing", joints("{type: ball, child: cube, stiffness: 1, saturation: 0}"), [], ["scene.yaml:11", "'saturation' must be positive"]),
+    ("range of one number", joints("{type: hinge, child: cube, range: 1}"), [], ["scene.yaml:11", "'range'", "2 numbers"]),
+    ("range upside down", joints("{type: hinge, child: cube, range: [1, -1]}"), [], ["scene.yaml:11", "lower first"]),
+    ("range elsewhere", joints("{type: hinge, child: cube, range: [0.5, 1]}"), [], ["scene.yaml:11", "'range' must hold 0", "the angle about its axis"]),
+    ("range of a fixed joint", joints("{type: fixed, child: cube, range: [-1, 1]}"), [], ["scene.yaml:11", "no coordinate"]),
+    ("range of a ball on both sides", joints("{type: ball, child: cube, range: [-1, 1]}"), [], ["scene.yaml:11", "[0, upper]"]),
+    ("stiffness of no range", joints("{type: hinge, child: cube, range_stiffness: 1}"), [], ["scene.yaml:11", "needs a 'range'"]),
+    ("drive of a ball", joints("{type: ball, child: cube, drive: {target: 1}}"), [], ["scene.yaml:11", "hinge, prismatic, cylindrical or planar"]),
+    ("drive of nothing", joints("{type: hinge, child: cube, drive: {stiffness: 0}}"), [], ["scene.yaml:11", "nothing is driven"]),
+    ("damper of a motor", joints("{type: hinge, child: cube, drive: {damping: 1}}"), [], ["scene.yaml:11", "'damping' is for a drive with a 'stiffness'"]),
+    ("drive to two targets", joints("{type: hinge, child: cube, drive: {target: 0, table: [[0, 0], [1, 1]]}}"), [], ["scene.yaml:11", "not both"]),
+    ("drive back in time", joints("{type: hinge, child: cube, drive: {table: [[1, 0], [0, 1]]}}"), [], ["scene.yaml:11", "must increase"]),
+    ("drive of three columns", joints("{type: hinge, child: cube, drive: {table: [[0, 0, 0]]}}"), [], ["scene.yaml:11", "2 numbers"]),
+    ("motor within an exact range", joints("{type: hinge, child: cube, range: [-1, 1], drive: {target: 0}}"), [], ["scene.yaml:11", "hold the same coordinate"]),
+    ("exact joint held in the middle of steps", joints("{name: elbow, type: ball, child: cube}"), ["-integrator", "midpoint"], ["-integrator midpoint", "'elbow'", "bdf2 or generalized_alpha"]),
+    ("exact range by bdf2", joints("{name: elbow, type: hinge, child: cube, range: [-1, 1]}"), ["-integrator", "bdf2"], ["-integrator bdf2", "'elbow'", "take euler", "'range_stiffness'"]),
+    ("range of a ball that is none", joints("{type: ball, child: cube, range: [0, 1e-6]}"), [], ["scene.yaml:11", "0.01 rad or more"]),
+    ("joint that tears at once", bodies("{name: bar, sphere: {radius: 0.1}, density: 1, position: [1, 1, 1], angular_velocity: [0, 0, 5]}", "", "\njoints: [{name: hip, type: hinge, child: bar, point: [0, 1, 1]}]"), [], ["joint 'hip'", "'bar' moves away from it by 5 m/s", "'velocity'"]),
+    # bodies and obstacles
+    ("body named world", bodies("{name: world, sphere: {radius: 1}, mass: 1}"), [], ["scene.yaml:9", "must not be world"]),
+    ("barrier wider than the body", bodies(cube.replace("density", "contact: {distance: 1}, density")), [], ["scene.yaml:9", "radius of gyration"]),
+    ("contact of a body that stays", bodies(cube.replace("density", "fixed: true, contact: none, density")), [], ["scene.yaml:9", "'contact' has no meaning"]),
+    ("contact of a body without a shape", bodies("{mass: 1, inertia: [1, 1, 1], contact: {friction: 1}}"), [], ["scene.yaml:9", "a body without a shape", "touches nothing"]),
+    ("misspelt contact of a body", bodies(cube.replace("density", "contact: {radius: 1}, density")), [], ["scene.yaml:9", "unknown key 'radius'"]),
+    ("negative friction of a body", bodies(cube.replace("density", "contact: {friction: -1}, density")), [], ["scene.yaml:9", "'friction' must not be negative"]),
+    ("body drawn in an obstacle", bodies(cube, "", "\ncolliders: [{name: ball, sphere: {radius: 5}}]\ncontact: {radius: 0.01}"), [], ["body 'cube' is drawn", "deep in collider 'ball'", "contact: none"]),
+    # point masses
+    ("mass without a vertex", (support, support + "\nloads: [{mass: 1}]"), [], ["scene.yaml:9", "needs the key 'vertex'"]),
+    ("negative mass on a vertex", (support, support + "\nloads: [{vertex: 1, mass: -1}]"), [], ["scene.yaml:9", "'mass' must be greater than zero"]),
     # bodies and what ties rods to them
     ("body of two shapes", bodies("{sphere: {radius: 1}, box: {size: [1, 1, 1]}, density: 1}"), [], ["scene.yaml:9", "two shapes, 'box' and 'sphere'", "keep one"]),
     ("body of density and mass", bodies("{sphere: {radius: 1}, density: 1, mass: 1}"), [], ["scene.yaml:9", "'density' and 'mass'", "one of them away"]),

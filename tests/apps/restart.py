@@ -340,7 +340,7 @@ constraints:
     with open(tmp + "/bodies.yaml") as scene:
         write(tmp + "/jointed.yaml", scene.read() + """- {type: pin, rod: a, vertex: 8, body: arm}
 joints:
-- {name: exact, type: hinge, child: lower, parent: arm, point: [0.2, 0.13, 0], axis: [1, 0, 1], range: [-0.3, 2]}
+- {name: exact, type: hinge, child: lower, parent: arm, point: [0.2, 0.13, 0], axis: [1, 0, 1], range: [-0.3, 2], range_stiffness: 0.1}
 - {name: motor, type: hinge, child: arm, parent: puck, point: [0.17, 0.06, 0], drive: {table: [[0, 0], [0.1, 0.3], [1, 1]], stiffness: 0.01, damping: 0.001}}
 - {name: soft, type: ball, child: bob, point: [0.5, 0, 0.02], stiffness: 5, damping: 0.1}
 colliders:

@@ -1,6 +1,7 @@
 /// Rigid bodies alone and on rods, against closed forms, reference solutions and the same thing built otherwise.
 #include "support/beams.hpp"
 #include "support/random_cell.hpp"
+#include "tendril/energy/derived.hpp"
 #include "tendril/geometry/rotation.hpp"
 
 namespace tendril::test {
@@ -113,6 +114,48 @@ TEST(Bodies, AHungBodyIsADeadForce) {
     }
     EXPECT_GT(deflection, 0.3);
     EXPECT_LT(off, 1e-6) << weld; // Newton's tolerance
+  }
+}
+
+/// What a rod does to a body at rest bears the weight of the body, and its moment about the tie.
+TEST(Bodies, TiesTellTheirForces) {
+  for (const bool weld : {false, true}) {
+    Scene scene;
+    scene.gravity = Vec3(0, 0, -1);
+    scene.rods = {beam({0, 0, 0}, {1, 0, 0}, 16, "rod")};
+    scene.rods[0].gravity = false;
+    scene.supports = {hold(scene, 0, 0, Support::Kind::clamp)};
+    const Vec3 at = weld ? Vec3(1.1, 0.2, 0.05) : Vec3(1, 0, -0.2);
+    scene.bodies = {bodyOf(sphereMass(0.1, 100), at)};
+    scene.attachments = {tie(scene, 0, 16, 0, weld)};
+    Simulation run;
+    runTo(run, scene, statics(4));
+    const RodActions actions = rodActions(run.scene, *run.elements, run.state, 1, 1, false);
+    const double weight = scene.bodies[0].own.mass; // that of the half edge is none: the rod has no weight
+    const Vec3 arm = run.state.body_position[0] - run.state.position[16],
+               moment = -arm.cross(Vec3(0, 0, -run.elements->bodyMass(0).mass));
+    EXPECT_NEAR(actions.attachment[0][2], run.elements->bodyMass(0).mass, 1e-5 * weight);
+    EXPECT_LT((actions.attachment_moment[0] - (weld ? moment : Vec3::Zero())).norm(), 1e-5 * weight) << weld;
+  }
+}
+
+/// A point mass on a vertex is a body there that nothing turns.
+TEST(Bodies, APointMassSwingsAsABodyOnAPin) {
+  Scene body, mass;
+  body.gravity = mass.gravity = Vec3(0, 0, -1);
+  body.rods = mass.rods = {beam({0, 0, 0}, {1, 0, 0}, 8, "rod")};
+  body.supports = mass.supports = {hold(mass, 0, 0, Support::Kind::pin)};
+  mass.forces = {{0, 8, Vec3::Zero(), 0.5}};
+  body.bodies = {bodyOf({0.5, Vec3::Zero(), 1e-3 * Mat3::Identity()}, {1, 0, 0})};
+  body.attachments = {tie(body, 0, 8, 0, false)};
+  for (const std::string name : {"euler", "bdf2"}) {
+    LoopSettings settings = dynamics(0.01, 0.5);
+    settings.integrator.name = name;
+    Simulation a, b;
+    runTo(a, body, settings);
+    runTo(b, mass, settings);
+    EXPECT_LT((a.state.position[8] - b.state.position[8]).norm(), 1e-6) << name; // Newton's tolerance over 50 steps
+    EXPECT_GT((b.state.position[8] - Vec3(1, 0, 0)).norm(), 0.05) << name;
   }
 }
 

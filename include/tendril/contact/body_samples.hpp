@@ -12,10 +12,9 @@ struct BodySample {
   double radius = 0;
 };
 
-/// Of a sphere one, of a capsule a row of them along its axis; corners, edges and faces of a box, rims and flanks of a
-/// cylinder, vertices and middles of the triangles of a mesh. Between them less than a quarter of the longest side, or
-/// of a rim a 48th; obstacles that are smaller may pass.
-/// \param centre of mass [m]
+/// Of a sphere one, of a capsule a row of them along its axis; corners, edges and faces of a box, rims, flanks and ends
+/// of a cylinder, vertices and middles of the triangles of a mesh. Between them less than a quarter of the longest
+/// side, or of a rim a 48th; obstacles that are smaller may pass. \param centre of mass [m]
 std::vector<BodySample> surfaceSamples(const Body &body, const Vec3 &centre);
 
 } // namespace tendril

@@ -35,6 +35,8 @@ struct RodActions {
   std::vector<Vec3> reaction_moment;
   std::vector<ConstraintReading> constraint; ///< (nc)
   std::vector<JointReading> joint;           ///< (nj)
+  /// (na) What rods do to bodies where they are tied exactly, the moment about the vertex [N], [N m].
+  std::vector<Vec3> attachment, attachment_moment;
 };
 /// With forces F and couples C, at an equilibrium and whatever the edge length: force(i) = force(i+1) + F(i+1) and
 /// moment(i) = moment(i+1) + e(i) x force(i) + C(i).

@@ -34,8 +34,10 @@ struct JointRow {
 };
 
 /// What may be held, in this order: where the child's point is from the parent's, along the parent's axes; the child's
-/// third axis along the parent's first and second; its second along the parent's first; and the coordinate.
-inline constexpr int joint_rows = 7, coordinate_row = 6;
+/// third axis along the parent's first and second; its second along the parent's first; and the coordinate. Behind, for
+/// springs in place of the turns that are held, the cosine of the angle that these make: between both third axes, or of
+/// the whole rotation.
+inline constexpr int joint_rows = 8, coordinate_row = 6, cosine_row = 7;
 using Rows = Eigen::Matrix<double, joint_rows, 1>;
 JointRow jointRow(const Joint &joint, const JointPlace &place, int row);
 /// Their values. A row that the joint has no use for is zero.
@@ -65,6 +67,9 @@ struct JointLaw {
     return sum;
   }
 };
+
+/// How fast the bodies of a joint leave what it holds, turns by the size of the child [m/s].
+double tearingOf(const Scene &scene, const Elements &elements, int index, const State &state, const Configuration &c);
 
 /// What a joint does at a state.
 struct JointReading {

@@ -4,6 +4,7 @@
 /// from it, and what is not in it cannot be read: a path that is missing, or of another type, does not compile. -help,
 /// -schema and -keys print it; scripts/docs makes pages of it.
 
+#include "tendril/io/body_keys.hpp"
 #include "tendril/io/option_keys.hpp"
 #include "tendril/io/scene_keys.hpp"
 
@@ -14,9 +15,10 @@ namespace tendril {
 
 /// Keys of scenes, then options.
 inline constexpr auto keys = [] {
-  std::array<Key, std::size(scene_keys) + std::size(option_keys)> all{};
+  std::array<Key, std::size(scene_keys) + std::size(body_keys) + std::size(option_keys)> all{};
   std::size_t row = 0;
   for (const Key &key : scene_keys) all[row++] = key;
+  for (const Key &key : body_keys) all[row++] = key;
   for (const Key &key : option_keys) all[row++] = key;
   return all;
 }();

@@ -120,10 +120,12 @@ struct Junction {
   int groups = 0;
 };
 
-/// Dead loads; torques act about the present tangent of their edge, moments are fixed in space.
+/// Dead loads, and point masses on vertices; torques act about the present tangent of their edge, moments are fixed in
+/// space.
 struct NodalForce {
   int rod, vertex;
-  Vec3 force; ///< [N]
+  Vec3 force;      ///< [N]
+  double mass = 0; ///< [kg]
 };
 struct EdgeMoment {
   int rod, edge;
