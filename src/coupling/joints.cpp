@@ -16,6 +16,8 @@ constexpr double epsilon = std::numeric_limits<double>::epsilon();
 /// By how much stiffer than what it holds an exact joint is between two updates of its forces: each takes the error of
 /// these down by as much.
 constexpr double stiffer = 1e6;
+/// In statics less, whose rounding must not hide what turns freely.
+constexpr double stiffer_in_statics = 1e3;
 /// And at most, than the softer of two bodies that are not alike: beyond, digits are lost.
 constexpr double stiffest = 1e9;
 /// Slots of forces of a drive and of an end of the range.
@@ -297,8 +299,9 @@ private:
     }
     const Rod &host = scene_.rods[std::size_t(joint.rod)];
     const double any = host.material.axial_stiffness / host.length(), size = sizeOf(joint);
-    auto between = [](double low, double high, double other) {
-      return high > 0 ? std::min(stiffer * high, stiffest * (low > 0 ? low : high)) : stiffer * other;
+    const double times = step.isStatic() ? stiffer_in_statics : stiffer;
+    auto between = [&](double low, double high, double other) {
+      return high > 0 ? std::min(times * high, stiffest * (low > 0 ? low : high)) : times * other;
     };
     return {between(least.first, most.first, any), between(least.second, most.second, any * size * size)};
   }

@@ -6,8 +6,6 @@
 namespace tendril {
 namespace {
 
-constexpr double degrees = 180 / pi;
-
 Joint::Type typeOf(const std::string &word) {
   return Joint::Type(std::find(std::begin(joint_types), std::end(joint_types), word) - std::begin(joint_types));
 }
@@ -143,13 +141,6 @@ void readJoint(const YamlValue &value, SceneFile &out) {
   if (joint.driven && joint.drive_stiffness < 0 && joint.hasRange() && joint.range_stiffness < 0)
     value.fail("an exact 'drive' and an exact 'range' hold the same coordinate; take one of them away, or give it a "
                "stiffness");
-  const double start = joint.driven ? joint.targetAt(0) : 0;
-  if (start != 0 && joint.drive_stiffness < 0) {
-    const bool slides = joint.held().slidesFreely();
-    out.notes.push_back("warning: " + value.place() + ": the drive begins " +
-                        shortText(slides ? start : start * degrees) + (slides ? " m" : " degrees") +
-                        " away from how the bodies are drawn, which jump there in the first step");
-  }
   map.finish();
   out.scene.joints.push_back(std::move(joint));
 }

@@ -174,6 +174,11 @@ void refuseWithJoints(const Scene &scene, Options &o, std::vector<std::string> *
                      "', which is exact, at the ends of its steps; take bdf2 or generalized_alpha, or give the "
                      "joint (its drive, its range) a stiffness");
   for (const Joint &j : scene.joints)
+    if (j.driven && j.drive_stiffness < 0 && j.targetAt(0) != 0)
+      throw SceneError("joint '" + j.name + "': its exact drive begins at " + shortText(j.targetAt(0)) +
+                       " and the bodies are drawn at 0, from where they would jump in the first step; write a 'table' "
+                       "that begins at 0, draw them there, or give the drive a 'stiffness'");
+  for (const Joint &j : scene.joints)
     if (j.hasRange() && j.range_stiffness < 0 && name != "euler")
       throw SceneError("option -integrator " + name + ": joint '" + j.name +
                        "' has an exact 'range', whose end would throw it back by what the method remembers of its "

@@ -258,6 +258,7 @@ rows = [
     ("motor within an exact range", joints("{type: hinge, child: cube, range: [-1, 1], drive: {target: 0}}"), [], ["scene.yaml:11", "hold the same coordinate"]),
     ("exact joint held in the middle of steps", joints("{name: elbow, type: ball, child: cube}"), ["-integrator", "midpoint"], ["-integrator midpoint", "'elbow'", "bdf2 or generalized_alpha"]),
     ("exact range by bdf2", joints("{name: elbow, type: hinge, child: cube, range: [-1, 1]}"), ["-integrator", "bdf2"], ["-integrator bdf2", "'elbow'", "take euler", "'range_stiffness'"]),
+    ("motor that jumps", joints("{name: elbow, type: hinge, child: cube, drive: {target: 0.5}}"), [], ["joint 'elbow'", "begins at 0.5", "give the drive a 'stiffness'"]),
     ("range of a ball that is none", joints("{type: ball, child: cube, range: [0, 1e-6]}"), [], ["scene.yaml:11", "0.01 rad or more"]),
     ("joint that tears at once", bodies("{name: bar, sphere: {radius: 0.1}, density: 1, position: [1, 1, 1], angular_velocity: [0, 0, 5]}", "", "\njoints: [{name: hip, type: hinge, child: bar, point: [0, 1, 1]}]"), [], ["joint 'hip'", "'bar' moves away from it by 5 m/s", "'velocity'"]),
     # bodies and obstacles

@@ -72,7 +72,17 @@ def exampleScene(path, value):
         put(scene, "loads[].torque", 1e-4)
     if path.startswith("loads[]"):
         put(scene, "loads[].edge" if name in ("torque", "moment", "edge") else "loads[].vertex", "last")
-    if path.startswith("bodies[]") or path == "constraints[].body":
+    if path.startswith("joints[]"):
+        joint = scene["joints"][0]
+        joint.setdefault("type", "hinge")
+        joint.setdefault("child", "cube")
+        if name in ("stiffness", "rotational_stiffness", "damping", "rotational_damping", "saturation") and "drive" not in joint:
+            joint.update({"stiffness": joint.get("stiffness", 1e5), "rotational_stiffness": joint.get("rotational_stiffness", 1e3)})
+        if name == "range_stiffness":
+            joint["range"] = [-1, 1]
+        if path in ("joints[].drive.damping", "joints[].drive.target"):
+            joint["drive"]["stiffness"] = 10
+    if path.startswith(("bodies[]", "joints[]")) or path == "constraints[].body":
         body = scene.setdefault("bodies", [{}])[0]
         body.setdefault("name", "cube")
         if not any(shape in body for shape in ("box", "sphere", "capsule", "cylinder", "mesh")):

@@ -182,8 +182,8 @@ def islands():
     text += "  - {type: pin, rod: b6, vertex: last, body: puck, stiffness: 50, damping: 0.01}\n"
     text += "bodies:\n"
     for k, name in enumerate(("bar", "bob", "puck", "alone")):
-        text += f"  - {{name: {name}, box: {{size: [0.02, 0.03, 0.04]}}, density: 500, position: [0.2, -0.12, {0.1 * k}], angular_velocity: [1, 0, {k}]}}\n"
-    text += "joints:\n  - {type: hinge, child: alone, parent: puck, point: [0.2, -0.12, 0.25], axis: [1, 0, 0], drive: {stiffness: 0.01, damping: 1e-4}}\n"
+        text += f"  - {{name: {name}, box: {{size: [0.02, 0.03, 0.04]}}, density: 500, position: [0.2, -0.12, {0.1 * k}], angular_velocity: [{int(k < 2)}, 0, {k}]}}\n"
+    text += "joints:\n  - {type: hinge, child: alone, parent: puck, point: [0.2, -0.12, 0.25], axis: [0, 0, 1], drive: {stiffness: 0.01, damping: 1e-4}}\n"
     text += "  - {type: ball, child: bob, point: [0.2, -0.1, 0.1], stiffness: 100, damping: 0.1}\n"
     return text
 
