@@ -44,7 +44,7 @@ bool NewtonSolver::residualFalls(RodSet island, double length) {
 /// Wright 2006, 18.3), wherever the rods are joined and held. False where it is impossible.
 bool NewtonSolver::tryCorrected(RodSet island, double length, double *free) {
   constexpr int sweeps = 2;
-  constexpr double little = 1e-12, too_long = 0.1; // of an edge
+  constexpr double little = 1e-10, too_long = 0.1; // of an edge; as strains are asked for
   const DofMap &dofs = potential_->dofs();
   Planes &step = work_->corrected, &response = work_->response;
   if (step.size() == 0) step = response = potential_->dofs().makePlanes();
