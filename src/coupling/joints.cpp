@@ -14,12 +14,8 @@ namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 /// By how much stiffer than what it holds an exact joint is between two updates of its forces: each takes the error of
-/// these down by as much.
-constexpr double stiffer = 1e6;
-/// In statics less, whose rounding must not hide what turns freely.
-constexpr double stiffer_in_statics = 1e3;
-/// And at most, than the softer of two bodies that are not alike: beyond, digits are lost.
-constexpr double stiffest = 1e9;
+/// these down by as much. In statics it does with less; bodies that are not alike take at most so much of the softer.
+constexpr double stiffer = 1e6, stiffer_in_statics = 1e3, stiffest = 1e9;
 /// Slots of forces of a drive and of an end of the range.
 constexpr int drive_force = 6, range_force = 7;
 
@@ -51,14 +47,12 @@ public:
     }
     for (const Constraint &c : scene.constraints)
       if (c.isToBody() && !c.isPin()) hold(c.to_body, 0, c.stiffness, 0);
-    for (std::size_t b = 0; b < held_.size(); ++b) {
-      const Body &body = scene.bodies[b];
-      const double size = elements.bodySize(int(b)), load = (body.gravity ? body.own.mass * scene.gravity.norm() : 0) +
-                                                            body.force.norm() + body.torque.norm() / size;
-      hold(int(b), load / size, 0, size);
+    for (int b = 0; b < int(held_.size()); ++b) { // loads over sizes
+      const Body &body = scene.bodies[std::size_t(b)];
+      const double size = elements.bodySize(b), weight = body.gravity ? body.own.mass * scene.gravity.norm() : 0;
+      hold(b, (weight + body.force.norm() + body.torque.norm() / size) / size, 0, size);
     }
   }
-
   bool roundsAsStrains() const override { return false; }
 
   void beginStep(const State &state, const Configuration &start, const Step &step, int rod) override {
@@ -67,6 +61,7 @@ public:
       Work &w = work_[std::size_t(p.joint)];
       std::tie(w.stiffness, w.turning) = stiffnessOf(joint, step);
       w.size = sizeOf(joint);
+      w.is_static = step.isStatic();
       w.damping = 0;
       if (!step.isStatic() && joint.dissipates()) {
         w.damping = 1 / step.dampingDt();
@@ -81,34 +76,27 @@ public:
   }
 
   double energy(const Configuration &c, int rod) const override {
-    double sum = 0;
-    for (const BodyPair &p : pairs(rod)) {
-      const JointPlace place = placeOf(jointOf(p), p, elements_, c);
-      sum += lawOf(p, jointValues(jointOf(p), place), place.drawn).value;
-    }
-    return sum;
+    return sumOver(c, rod, [&](const BodyPair &p, const Rows &values, const JointPlace &place) {
+      return lawOf(p, values, place.drawn).value;
+    });
   }
   double violation(const Configuration &c, int rod) const override {
-    double sum = 0;
-    for (const BodyPair &p : pairs(rod)) {
-      const JointPlace place = placeOf(jointOf(p), p, elements_, c);
+    return sumOver(c, rod, [&](const BodyPair &p, const Rows &values, const JointPlace &place) {
       JointLaw exact;
-      addExact(p, jointValues(jointOf(p), place), place.drawn, exact);
-      sum += exact.value;
-    }
-    return sum;
+      addExact(p, values, place.drawn, exact);
+      return exact.value;
+    });
   }
   double noise(const Configuration &c, int rod, double) const override {
-    double sum = 0;
-    for (const BodyPair &p : pairs(rod)) {
-      const JointPlace place = placeOf(jointOf(p), p, elements_, c);
-      const JointLaw law = lawOf(p, jointValues(jointOf(p), place), place.drawn);
+    return sumOver(c, rod, [&](const BodyPair &p, const Rows &values, const JointPlace &place) {
+      const JointLaw law = lawOf(p, values, place.drawn);
+      double sum = 0;
       for (int k = 0; k < joint_rows; ++k) {
         const double blur = 16 * epsilon * (isTurn(jointOf(p), k) ? 1 : place.reach.norm() + place.arm.norm());
         sum += (std::abs(law.slope[k] + law.more[k]) + law.curvature(k, k) * blur) * blur;
       }
-    }
-    return sum;
+      return sum;
+    });
   }
   double mismatch(const Configuration &c, int rod) const override {
     double most = 0;
@@ -127,12 +115,11 @@ public:
   }
 
   void addEnergies(const State &, const Configuration &c, double, int rod, EnergyBudget &out) const override {
-    for (const BodyPair &p : pairs(rod)) {
-      const JointPlace place = placeOf(jointOf(p), p, elements_, c);
-      JointLaw law;
-      law.addSprings(jointOf(p), jointValues(jointOf(p), place), place.drawn);
-      out.constraint += law.value;
-    }
+    out.constraint += sumOver(c, rod, [&](const BodyPair &p, const Rows &values, const JointPlace &place) {
+      JointLaw springs;
+      springs.addSprings(jointOf(p), values, place.drawn);
+      return springs.value;
+    });
   }
 
   void addDerivatives(const Configuration &c, int r, Derivatives &out, HessianKind hessian) const override {
@@ -152,6 +139,13 @@ public:
         for (int l = 0; l < joint_rows; ++l)
           if (law.curvature(k, l) != 0)
             h += law.curvature(k, l) * row.gradient * rows[std::size_t(l)].gradient.transpose();
+      }
+      // A body on two balls turns freely about the line between: above what Newton leaves undone there.
+      constexpr double neutral = 1e-12;
+      const Work &w = work_[std::size_t(p.joint)];
+      for (int k = 0; k < 3 && w.is_static; ++k) {
+        h(3 + k, 3 + k) += neutral * w.stiffness * place.arm.squaredNorm();
+        h(9 + k, 9 + k) += neutral * w.stiffness * place.parent_arm.squaredNorm();
       }
       const RodRange &rod = elements_.rods[std::size_t(r)];
       for (int i = 0; i < p.variables(); ++i)
@@ -236,7 +230,8 @@ private:
     double stiffness = 0, turning = 0;            ///< of exact equations [N/m], [N m]
     double size = 1;                              ///< of the smaller body [m]
     double damping = 0;                           ///< one over time [1/s], or 0
-    Rows rest = Rows::Zero();                     ///< around which dampers pull (dampedRows)
+    bool is_static = false;
+    Rows rest = Rows::Zero(); ///< around which dampers pull (dampedRows)
   };
   /// One that is exact: by how much it is off, and how stiff it is between two updates of its force.
   struct Equation {
@@ -251,6 +246,14 @@ private:
 
   std::span<const BodyPair> pairs(int rod) const { return pairs_.of({rod, rod + 1}); }
   const Joint &jointOf(const BodyPair &p) const { return scene_.joints[std::size_t(p.joint)]; }
+  template <class Value> double sumOver(const Configuration &c, int rod, Value value) const {
+    double sum = 0;
+    for (const BodyPair &p : pairs(rod)) {
+      const JointPlace place = placeOf(jointOf(p), p, elements_, c);
+      sum += value(p, jointValues(jointOf(p), place), place);
+    }
+    return sum;
+  }
   static bool isTurn(const Joint &joint, int row) {
     return row == coordinate_row ? !joint.held().slidesFreely() : row > 2;
   }
@@ -279,10 +282,8 @@ private:
     return (isTurn(joint, coordinate_row) ? w.turning : w.stiffness) / stiffer;
   }
   double sizeOf(const Joint &joint) const {
-    const double size = elements_.bodySize(joint.child);
-    return joint.parent < 0 ? size : std::min(size, elements_.bodySize(joint.parent));
+    return std::min(elements_.bodySize(joint.child), joint.parent < 0 ? HUGE_VAL : elements_.bodySize(joint.parent));
   }
-
   /// So much stiffer than inertia and what else holds both bodies.
   std::pair<double, double> stiffnessOf(const Joint &joint, const Step &step) const {
     std::pair<double, double> least{HUGE_VAL, HUGE_VAL}, most{0, 0};

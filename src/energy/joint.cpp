@@ -38,6 +38,21 @@ JointRow pointRow(const JointPlace &p, int k) {
   return row;
 }
 
+/// The same along an axis of the world, where all of the point is held: turns of the parent alone change nothing then,
+/// not even to second order.
+JointRow heldPointRow(const JointPlace &p, int k) {
+  const Vec3 s = Vec3::Unit(k);
+  JointRow row;
+  row.value = p.reach[k] - p.parent_arm[k];
+  row.gradient.segment<3>(child) = s;
+  row.gradient.segment<3>(parent) = -s;
+  row.gradient.segment<3>(child_spin) = p.arm.cross(s);
+  row.gradient.segment<3>(parent_spin) = s.cross(p.parent_arm);
+  row.hessian.block<3, 3>(child_spin, child_spin) = curvatureOfArm(s, p.arm);
+  row.hessian.block<3, 3>(parent_spin, parent_spin) = -curvatureOfArm(s, p.parent_arm);
+  return row;
+}
+
 /// Cosine between an axis of the parent and one of the child.
 JointRow axesRow(const JointPlace &p, int k, int l) {
   const Vec3 t = p.axes.col(l);
@@ -175,7 +190,7 @@ JointRow jointRow(const Joint &joint, const JointPlace &place, int row) {
   case 0:
   case 1:
   case 2:
-    return pointRow(place, row);
+    return joint.held().across && joint.held().along ? heldPointRow(place, row) : pointRow(place, row);
   case 3:
   case 4:
     return axesRow(place, row - 3, 2);

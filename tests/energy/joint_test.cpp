@@ -52,7 +52,7 @@ TEST(JointRows, DerivativesMatchAutomaticDifferentiation) {
         D exact;
         double turns = 0;
         if (k < 3)
-          exact = s[std::size_t(k)].dot(gap);
+          exact = type == Joint::Type::prismatic ? s[std::size_t(k)].dot(gap) : gap[k];
         else if (k < 5)
           exact = s[std::size_t(k - 3)].dot(t[2]);
         else if (k == 5)

@@ -33,7 +33,8 @@ struct JointRow {
   Mat12 hessian = Mat12::Zero();
 };
 
-/// What may be held, in this order: where the child's point is from the parent's, along the parent's axes; the child's
+/// What may be held, in this order: where the child's point is from the parent's, along the parent's axes, or those of
+/// the world where all of it is held; the child's
 /// third axis along the parent's first and second; its second along the parent's first; and the coordinate. Behind, for
 /// springs in place of the turns that are held, the cosine of the angle that these make: between both third axes, or of
 /// the whole rotation.
