@@ -18,7 +18,7 @@ extern "C" void catchSignal(int signal) {
   if (caught == 0) {
     first = now;
     caught = signal;
-    if (!silent) (void)!write(STDERR_FILENO, text, sizeof text - 1);
+    if (!silent) (void)!::write(STDERR_FILENO, text, sizeof text - 1);
   } else if (double(now.tv_sec - first.tv_sec) + 1e-9 * double(now.tv_nsec - first.tv_nsec) > same_request) {
     std::signal(signal, SIG_DFL);
     std::raise(signal);
