@@ -57,8 +57,8 @@ public:
     double longest = way.norm() + (after - before).norm() * reach_;
     for (const int k : met_) { // obstacles go their part of the way
       const Collider::Pose here = pose(k, from), there = pose(k, to);
-      longest = std::max(longest, longest + (there.position - here.position).norm() +
-                                      (there.rotation - here.rotation).norm() * (start - here.position).norm());
+      longest += (there.position - here.position).norm() +
+                 (there.rotation - here.rotation).norm() * (start - here.position).norm();
     }
     const double wall = -0.5 * settings().distance, stop_at = near * settings().distance;
     double free = 1;
