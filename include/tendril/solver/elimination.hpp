@@ -47,6 +47,15 @@ public:
   T negative{0.0}, zero{0.0};
 
 private:
+  /// What comes once to a run. Packs live in memory anyway; in one function with the loop they take minutes to compile.
+  template <class Do> void rarely(const Do &act) {
+    if constexpr (std::is_same_v<T, double>)
+      act();
+    else
+      apart(act);
+  }
+  template <class Do> [[gnu::noinline]] static void apart(const Do &act) { act(); }
+
   void corner(T (&far)[state_size][state_size]) const {
     for (int r = 0; r < state_size; ++r)
       for (int c = 0; c < state_size; ++c) far[r][c] = corner_[std::min(r, c)][std::max(r, c)];
@@ -56,11 +65,11 @@ private:
     if (border == Border::none && !held_[last_]) addVertex(last_, state_);
     for (int i = n_ - 1; i > begin_; --i) {
       if (bordered && i == n_ - 1)
-        closeRing();
+        rarely([&] { closeRing(); });
       else
         step(i, nextHeld(i));
     }
-    keeps_first_ ? keepFirst() : firstEdge();
+    rarely([&] { keeps_first_ ? keepFirst() : firstEdge(); });
   }
 
   /// The state becomes that of the first edge with its vertex, and what these have by themselves is added.
@@ -167,7 +176,7 @@ private:
   void step(int i, bool held) {
     moveBack(held);
     if (held)
-      substitute(i);
+      rarely([&] { substitute(i); });
     else
       eliminate(i);
   }
