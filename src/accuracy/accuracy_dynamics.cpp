@@ -104,11 +104,11 @@ private:
   std::vector<double> times_; ///< of the samples [s]
   int frames_ = 1;            ///< where steps are short against the time between frames, they divide it
   Resolution most_;           ///< of coarsest runs: what does not converge there is given up
-  std::map<Resolution, Samples> runs_;
+  std::map<Resolution, RunSamples> runs_;
   std::vector<double> seen_steps_, seen_edges_; ///< orders seen last, per rod
   std::string failure_;                         ///< of the last run that failed
   bool start_resolved_ = false;
-  Samples start_; ///< at the first of the times, by adapted steps
+  RunSamples start_; ///< at the first of the times, by adapted steps
   int probes_ = 0;
   double seconds_ = 0, work_ = 0; ///< of all probes [s; edges x steps]
 
@@ -137,13 +137,13 @@ private:
     return r;
   }
 
-  void count(const Samples &run) {
+  void count(const RunSamples &run) {
     ++probes_;
     seconds_ += run.seconds;
     work_ += run.work();
   }
 
-  PetscErrorCode probe(const Resolution &resolution, const Samples **out) {
+  PetscErrorCode probe(const Resolution &resolution, const RunSamples **out) {
     PetscFunctionBeginUser;
     const auto [place, is_new] = runs_.try_emplace(resolution);
     if (is_new) {
@@ -167,7 +167,7 @@ private:
   PetscErrorCode trends(const Resolution &base, Resolution (Chooser::*refined)(const Resolution &, int) const,
                         int formal, std::vector<double> &before, std::vector<Trend> *out) {
     PetscFunctionBeginUser;
-    const Samples *run[3];
+    const RunSamples *run[3];
     for (int k = 0; k < 3; ++k) {
       PetscCall(probe((this->*refined)(base, 1 << k), &run[k]));
       if (!run[k]->failure.empty()) PetscFunctionReturn(0);
@@ -231,9 +231,9 @@ private:
     }
     *resolved = true;
     if (!start_.failure.empty()) PetscFunctionReturn(0);
-    const Samples *run[3];
+    const RunSamples *run[3];
     for (int k = 0; k < 3; ++k) PetscCall(probe(withSteps(base, 1 << k), &run[k]));
-    auto apart = [&](const Samples &a, const Samples &b) {
+    auto apart = [&](const RunSamples &a, const RunSamples &b) {
       return difference(scene_, a.first(), b.first(), base.edges, Quantity::position);
     };
     const std::vector<Errors> once = apart(*run[0], *run[1]), twice = apart(*run[1], *run[2]),

@@ -5,9 +5,9 @@
 
 namespace tendril {
 
-double Samples::work() const { return std::accumulate(edges.begin(), edges.end(), 0.0) * double(steps); }
+double RunSamples::work() const { return std::accumulate(edges.begin(), edges.end(), 0.0) * double(steps); }
 
-PetscErrorCode sample(Scene scene, const LoopSettings &settings, const std::vector<double> &times, Samples *out) {
+PetscErrorCode sample(Scene scene, const LoopSettings &settings, const std::vector<double> &times, RunSamples *out) {
   PetscFunctionBeginUser;
   *out = {};
   out->edges = edgesOf(scene);
@@ -35,7 +35,7 @@ PetscErrorCode sample(Scene scene, const LoopSettings &settings, const std::vect
   PetscFunctionReturn(0);
 }
 
-std::vector<Errors> difference(const Scene &scene, const Samples &run, const Samples &other,
+std::vector<Errors> difference(const Scene &scene, const RunSamples &run, const RunSamples &other,
                                const std::vector<int> &edges, Quantity of) {
   const std::size_t times = run.position.size();
   if (of == Quantity::energy) {

@@ -42,24 +42,6 @@ Vec3 resultantLoad(const Scene &scene, const Elements &elements, int r, double l
   return sum;
 }
 
-/// Stiffness of the barrier of a rod [N/m]: ten times its weight per length, or where it has more to bear as much as
-/// keeps surfaces within the barrier; a power of four.
-double barrierStiffness(const Scene &scene, const Elements &elements, double force, double pressure, bool is_static,
-                        int r) {
-  const Rod &rod = scene.rods[r];
-  const double length = elements.length(r);
-  double wanted = std::max(force / (20 * rod.contact.radius), 0.1 * pressure);
-  if (rod.gravity) wanted = std::max(wanted, 10 * rod.material.linear_density * scene.gravity.norm());
-  // What bends it by its own length: where nothing pulls, and in statics, where supports press it as its bending asks.
-  const auto [k1, k2] = rod.material.flexural_stiffness;
-  const double cube = length * length * length;
-  if (wanted == 0)
-    wanted = std::max({k1, k2, 1e-4 * rod.material.axial_stiffness * length * length}) / cube;
-  else if (is_static)
-    wanted = std::max(wanted, std::sqrt(k1 * k2) / cube);
-  return std::pow(4.0, std::ceil(std::log2(wanted) / 2));
-}
-
 class Contact final : public Term {
 public:
   Contact(const Scene &scene, const Elements &elements) : scene_(scene), elements_(elements) {

@@ -1,5 +1,7 @@
 /// What obstacles do to rods, for output and messages.
 #include "tendril/contact/friction.hpp"
+#include "tendril/contact/neighbours.hpp"
+#include "tendril/contact/segments.hpp"
 
 #include <algorithm>
 
@@ -7,6 +9,22 @@ namespace tendril {
 
 bool carriesSurface(const Rod &rod) {
   return rod.contact.on && rod.contact.slides() && rod.contact.friction_at_surface && !rod.material.isCable();
+}
+
+double barrierStiffness(const Scene &scene, const Elements &elements, double force, double pressure, bool is_static,
+                        int r) {
+  const Rod &rod = scene.rods[r];
+  const double length = elements.length(r);
+  double wanted = std::max(force / (20 * rod.contact.radius), 0.1 * pressure);
+  if (rod.gravity) wanted = std::max(wanted, 10 * rod.material.linear_density * scene.gravity.norm());
+  // What bends it by its own length: where nothing pulls, and in statics, where supports press it as its bending asks.
+  const auto [k1, k2] = rod.material.flexural_stiffness;
+  const double cube = length * length * length;
+  if (wanted == 0)
+    wanted = std::max({k1, k2, 1e-4 * rod.material.axial_stiffness * length * length}) / cube;
+  else if (is_static)
+    wanted = std::max(wanted, std::sqrt(k1 * k2) / cube);
+  return std::pow(4.0, std::ceil(std::log2(wanted) / 2));
 }
 
 ContactPoint contactPoint(const Scene &scene, const RodContacts &rod, const Samples &samples, int k) {
@@ -67,6 +85,29 @@ void colliderActions(const Scene &scene, const std::vector<ContactReading> &read
     (*force)[c.collider] += c.force + c.friction;
     (*moment)[c.collider] += from.cross(c.force) + at.cross(c.friction);
   }
+}
+
+std::vector<Meeting> overlapsOfRods(const Scene &scene, const Elements &elements, const Configuration &c) {
+  std::vector<Meeting> found;
+  if (!scene.touchesRods()) return found;
+  const Neighbours neighbours(scene, elements);
+  Room room;
+  for (std::size_t v = 0; v < elements.vertex_slot.size(); ++v)
+    room.middle.push_back(c.positionAt(elements.vertex_slot[v]));
+  room.radius.assign(room.middle.size(), 0);
+  for (const EdgePair &p : neighbours.find(room)) {
+    const ContactSettings &a = scene.rods[std::size_t(p.rod)].contact, &b = scene.rods[std::size_t(p.to_rod)].contact;
+    const Closest near =
+        closest(c.positionAt(p.slot[0]), c.positionAt(p.slot[1]), c.positionAt(p.slot[2]), c.positionAt(p.slot[3]));
+    if (near.distance > wallBetween(a, b)) continue;
+    auto arc = [&](int rod, int edge, double part) {
+      return neighbours.arc(rod, edge) + part * elements.restLength()[elements.rods[std::size_t(rod)].slot(edge)];
+    };
+    found.push_back({p.rod, p.to_rod, near.distance - a.radius - b.radius, arc(p.rod, p.edge, near.part),
+                     arc(p.to_rod, p.to_edge, near.other_part)});
+  }
+  std::stable_sort(found.begin(), found.end(), [](const Meeting &a, const Meeting &b) { return a.gap < b.gap; });
+  return found;
 }
 
 std::vector<Touch> tightest(const Scene &scene, const Elements &elements, const Configuration &c) {

@@ -61,7 +61,7 @@ PetscErrorCode ArcLength::begin(const State &state, Point *direction) {
   Step step;
   step.time = step.load_factor = state.time;
   step.mixed = settings_.mixed;
-  solver_.begin(state, step);
+  PetscCall(solver_.begin(state, step));
   PetscCall(tangent(direction));
   PetscFunctionReturn(0);
 }

@@ -12,7 +12,7 @@
 namespace tendril {
 namespace {
 
-constexpr MotionKeys motion_keys{"bodies[].motion", "bodies[].motion.velocity", "bodies[].motion.angular_velocity",
+constexpr MotionKeys body_motion_keys{"bodies[].motion", "bodies[].motion.velocity", "bodies[].motion.angular_velocity",
                                  "bodies[].motion.table"};
 constexpr const char *shape_names = "box, sphere, capsule, cylinder or mesh";
 
@@ -37,13 +37,13 @@ std::shared_ptr<const TriangleMesh> readSurface(YamlMap &map) {
   return mesh;
 }
 
-struct ShapeKey {
+struct BodyShapeKey {
   KeyOf<KeyType::map, KeyType::list, KeyType::word_or_map> key;
   /// Its mass properties with the density 1 in its own axes; `turn` is from these to those of the file.
   MassProperties (*read)(YamlMap &map, Body &out, Mat3 &turn);
 };
 
-constexpr ShapeKey shape_keys[] = {
+constexpr BodyShapeKey body_shape_keys[] = {
     {"bodies[].box",
      [](YamlMap &map, Body &out, Mat3 &) {
        out.size = map.vector("bodies[].box.size");
@@ -286,7 +286,7 @@ void readBody(const YamlValue &value, const ContactSettings &contact, SceneFile 
   body.name = readBodyName(map, out);
   MassProperties solid;
   Mat3 turn = Mat3::Identity();
-  for (const ShapeKey &shape : shape_keys) {
+  for (const BodyShapeKey &shape : body_shape_keys) {
     if (!map.has(*shape.key)) continue;
     const std::string name(shape.key->name());
     if (body.shape != "none")
@@ -312,7 +312,7 @@ void readBody(const YamlValue &value, const ContactSettings &contact, SceneFile 
   if (map.has("bodies[].motion")) {
     const YamlValue motion = map.at("bodies[].motion");
     if (map.flag("bodies[].fixed")) motion.fail("'fixed' and 'motion' contradict each other; take one of them away");
-    body.motion = readMotion(motion, motion_keys);
+    body.motion = readMotion(motion, body_motion_keys);
   }
   for (const AnyKey key : {AnyKey("bodies[].velocity"), AnyKey("bodies[].angular_velocity"), AnyKey("bodies[].force"),
                            AnyKey("bodies[].torque"), AnyKey("bodies[].contact")})

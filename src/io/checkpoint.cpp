@@ -119,6 +119,10 @@ template <class Archive, class AnyContents> void exchange(Archive &a, AnyContent
   std::size_t joints = s.joints.size();
   whole("joints", joints, 1e15);
   a.array("joints", s.joints, joints);
+  if (a.format_version < 9) return;
+  std::size_t touching = s.rod_contact_stiffness.size();
+  whole("rods_that_touch_rods", touching, 1e15);
+  a.array("rod_contact_stiffness", s.rod_contact_stiffness, touching);
 }
 
 /// Whole turns of cells that were others in the checkpoint: the twist of a vertex along the rod stays what it was, by
@@ -336,6 +340,7 @@ void adapt(Found *f, const std::vector<double> &places, const Simulation &run, c
   if (cells.empty() && s.winding.size() != places.size()) s.winding.assign(places.size(), 0.0);
   const std::size_t rods = run.elements->rods.size();
   if (s.contact_stiffness.size() < rods) s.contact_stiffness.clear();
+  if (s.rod_contact_stiffness.size() < rods) s.rod_contact_stiffness.clear();
   if (s.contacts.size() != rods) s.contacts.clear();
   s.junction_axes.resize(run.elements->groups, {Vec3::UnitX(), Vec3::UnitY()});
   for (Rates &rates : s.memory) rates.body.resize(run.scene.bodies.size());

@@ -17,8 +17,8 @@ Vec3 axisOf(YamlMap &map, KeyOf<KeyType::vector> key) {
 
 namespace {
 
-constexpr MotionKeys motion_keys{"colliders[].motion", "colliders[].motion.velocity",
-                                 "colliders[].motion.angular_velocity", "colliders[].motion.table"};
+constexpr MotionKeys collider_motion_keys{"colliders[].motion", "colliders[].motion.velocity",
+                                          "colliders[].motion.angular_velocity", "colliders[].motion.table"};
 
 /// Endless where it is not given.
 double lengthOf(YamlMap &map, KeyOf<KeyType::number> key) { return map.has(*key) ? map.number(key) : HUGE_VAL; }
@@ -82,17 +82,17 @@ constexpr ShapeKey shape_keys[] = {
      }}};
 
 struct ContactKeys {
-  KeyOf<KeyType::word, KeyType::word_or_map> law, friction_at, quadrature, stick;
+  KeyOf<KeyType::word, KeyType::word_or_map> rods, law, friction_at, quadrature, stick;
   KeyOf<KeyType::number> radius, distance, stiffness, threshold, smoothing, friction, fall_off_velocity, slip_length,
       tangential_damping, normal_damping;
 };
 // clang-format off
 constexpr ContactKeys of_scene{
-    "contact.law", "contact.friction_at", "contact.quadrature", "contact.stick", "contact.radius",
+    "contact.rods", "contact.law", "contact.friction_at", "contact.quadrature", "contact.stick", "contact.radius",
     "contact.distance", "contact.stiffness", "contact.threshold", "contact.smoothing", "contact.friction",
     "contact.fall_off_velocity", "contact.slip_length", "contact.tangential_damping", "contact.normal_damping"};
 constexpr ContactKeys of_rod{
-    "rods[].contact.law", "rods[].contact.friction_at", "rods[].contact.quadrature", "rods[].contact.stick",
+    "rods[].contact.rods", "rods[].contact.law", "rods[].contact.friction_at", "rods[].contact.quadrature", "rods[].contact.stick",
     "rods[].contact.radius", "rods[].contact.distance", "rods[].contact.stiffness", "rods[].contact.threshold",
     "rods[].contact.smoothing", "rods[].contact.friction", "rods[].contact.fall_off_velocity", "rods[].contact.slip_length",
     "rods[].contact.tangential_damping", "rods[].contact.normal_damping"};
@@ -102,6 +102,11 @@ void readSettings(YamlMap &map, const ContactKeys &keys, ContactSettings &out) {
   auto read = [&](KeyOf<KeyType::number> key, double &value) {
     if (map.has(*key)) value = map.number(key);
   };
+  if (map.has(*keys.rods)) {
+    using Rods = ContactSettings::Rods;
+    const std::string which = map.word(keys.rods);
+    out.rods = which == "all" ? Rods::all : which == "others" ? Rods::others : Rods::none;
+  }
   if (map.has(*keys.law)) {
     using Law = ContactSettings::Law;
     const Law law = map.word(keys.law) == "penalty" ? Law::penalty : Law::barrier;
@@ -186,13 +191,14 @@ void readIgnored(YamlMap &scene, SceneFile &out) {
   }
 }
 
-void completeContact(const YamlValue &colliders, const Overrides &overrides, Scene &scene) {
+void completeContact(const YamlValue &block, const Overrides &overrides, Scene &scene) {
   auto replace = [&](const char *name, double &value) {
     if (const auto o = overrides.find(name); o != overrides.end()) value = std::stod(o->second);
   };
+  const Rod *one = nullptr; // the first that touches rods
   for (Rod &rod : scene.rods) {
     ContactSettings &contact = rod.contact;
-    if (!contact.on) continue;
+    if (!contact.on || (scene.colliders.empty() && !contact.touchesRods())) continue;
     replace("contact_stiffness", contact.stiffness);
     replace("contact_friction", contact.friction);
     replace("contact_distance", contact.distance);
@@ -200,17 +206,23 @@ void completeContact(const YamlValue &colliders, const Overrides &overrides, Sce
       throw SceneError("option -contact_distance: is for 'law: barrier', which rod '" + rod.name + "' has not");
     if (std::isnan(contact.radius)) {
       if (!rod.material.section)
-        colliders.fail("rod '" + rod.name +
-                       "' has no section that tells its radius; give it 'contact: {radius: ...}', or 'contact: none'");
+        block.fail("rod '" + rod.name +
+                   "' has no section that tells its radius; give it 'contact: {radius: ...}', or 'contact: none'");
       contact.radius = std::max(rod.material.section->halfAxes()[0], rod.material.section->halfAxes()[1]);
     }
     if (contact.radius == 0 && contact.isBarrier())
-      colliders.fail("rod '" + rod.name + "' has the contact radius 0, for which there is only 'law: penalty'");
+      block.fail("rod '" + rod.name + "' has the contact radius 0, for which there is only 'law: penalty'");
+    if (contact.radius == 0 && contact.touchesRods())
+      block.fail("rod '" + rod.name + "' touches rods, and needs a contact radius above 0 for it");
     if (std::isnan(contact.distance)) contact.distance = 0.2 * contact.radius;
     if (contact.isBarrier() && contact.distance > contact.radius)
-      colliders.fail("rod '" + rod.name + "': the 'distance' of its contact, " + shortText(contact.distance) +
-                     " m, must not exceed its radius, " + shortText(contact.radius) + " m");
+      block.fail("rod '" + rod.name + "': the 'distance' of its contact, " + shortText(contact.distance) +
+                 " m, must not exceed its radius, " + shortText(contact.radius) + " m");
     if (!contact.isBarrier() && contact.stiffness == 0) contact.stiffness = 1e9;
+    if (contact.touchesRods() && !one) one = &rod;
+    if (contact.touchesRods() && one->contact.law != contact.law)
+      block.fail("rods '" + one->name + "' and '" + rod.name +
+                 "' touch each other by two laws, barrier and penalty; give all rods that touch rods the same");
     if (contact.slip_length == 0) contact.slip_length = 1e-3 * (contact.radius > 0 ? contact.radius : 0.01);
   }
 }
@@ -241,7 +253,7 @@ void readCollider(const YamlValue &value, Scene &scene) {
   const Vec3 rotation = map.vector("colliders[].rotation");
   if (rotation.norm() > 0) turn = Eigen::AngleAxisd(rotation.norm(), rotation.normalized()).toRotationMatrix() * turn;
   c.rotation = turn;
-  if (map.has("colliders[].motion")) c.motion = readMotion(map.at("colliders[].motion"), motion_keys);
+  if (map.has("colliders[].motion")) c.motion = readMotion(map.at("colliders[].motion"), collider_motion_keys);
   if (map.has("colliders[].friction")) c.friction = map.number("colliders[].friction");
   map.finish();
   scene.colliders.push_back(std::move(c));

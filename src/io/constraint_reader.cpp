@@ -8,7 +8,7 @@
 namespace tendril {
 namespace {
 
-constexpr MotionKeys motion_keys{"constraints[].motion", "constraints[].motion.velocity",
+constexpr MotionKeys constraint_motion_keys{"constraints[].motion", "constraints[].motion.velocity",
                                  "constraints[].motion.angular_velocity", "constraints[].motion.table"};
 
 double stiffestTurning(const Material &m) {
@@ -173,7 +173,7 @@ void readConstraint(const YamlValue &value, SceneFile &out) {
       map.at("constraints[].saturation").fail("'saturation' must be positive, or negative for none; found 0");
     if (map.has("constraints[].motion")) {
       const YamlValue motion = map.at("constraints[].motion");
-      c.motion = readMotion(motion, motion_keys);
+      c.motion = readMotion(motion, constraint_motion_keys);
       if (c.isPin())
         refuseTurning(motion, c.motion, "a pin turns nothing; take the rotation away, or write 'type: rotation', too");
       else

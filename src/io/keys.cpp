@@ -118,7 +118,11 @@ std::string boundsText(const Key &key) {
 
 /// What keys of one block ask of each other. The reader says the same, in words.
 std::string rulesOf(std::string_view block) {
-  if (block.empty()) return R"("dependencies": {"contact": ["colliders"]})";
+  if (block.empty())
+    return R"("if": {"required": ["contact"]}, "then": {"anyOf": [{"required": ["colliders"]},
+ {"properties": {"contact": {"required": ["rods"], "properties": {"rods": {"enum": ["others", "all"]}}}}},
+ {"properties": {"rods": {"contains": {"required": ["contact"],
+  "properties": {"contact": {"type": "object", "required": ["rods"], "properties": {"rods": {"enum": ["others", "all"]}}}}}}}]})";
   if (block == "rods[]")
     return R"("oneOf": [{"required": ["line"]}, {"required": ["ring"]}, {"required": ["helix"]}, {"required": ["points"]}, {"required": ["file"]}])";
   if (block == "rods[].material")

@@ -34,7 +34,8 @@ void requireHeld(const Scene &scene) {
   for (const Constraint &c : scene.constraints)
     if (c.isPin() && c.isToWorld() && c.stiffness > 0) held[rootOf(c.rod)] = true;
   for (int r = 0; r < int(scene.rods.size()); ++r)
-    if (scene.touches(r)) held[rootOf(r)] = true; // what obstacles hold shows
+    if (scene.touches(r) || scene.rods[r].contact.touchesRods())
+      held[rootOf(r)] = true; // what obstacles and other rods hold shows
   for (int b = 0; b < int(scene.bodies.size()); ++b)
     if (scene.touchesBody(b)) held[rootOf(scene.bodies[b].rod)] = true;
   std::vector<char> tied(scene.bodies.size(), false);
@@ -79,6 +80,19 @@ void refuseTearing(const Simulation &run) {
 void refuseOverlaps(const Simulation &run) {
   const Scene &scene = run.scene;
   const Configuration drawn = configurationOf(run.state, scene, *run.elements, run.state.time);
+  if (const std::vector<Meeting> rods = overlapsOfRods(scene, *run.elements, drawn); !rods.empty()) {
+    const Meeting &m = rods.front();
+    const Rod &one = scene.rods[std::size_t(m.rod)], &other = scene.rods[std::size_t(m.to_rod)];
+    throw SceneError(
+        "rod '" + one.name + "' at arc length " + shortText(m.arc) + " m lies " + shortText(-m.gap) + " m deep in " +
+        (m.rod == m.to_rod ? "itself" : "rod '" + other.name + "'") + " at " + shortText(m.to_arc) +
+        " m as it is drawn" +
+        (rods.size() > 1 ? ", and so do " + std::to_string(rods.size() - 1) + " more pairs of edges" : "") +
+        "; move them " + shortText(-m.gap) +
+        " m or more apart, give them a smaller 'contact: {radius: "
+        "...}', or write 'contact: {rods: " +
+        (m.rod == m.to_rod ? "others}'" : "none}' for one of them"));
+  }
   for (const Touch &o : tightestOfBodies(scene, *run.elements, drawn))
     if (const Body &body = scene.bodies[std::size_t(o.rod)]; o.gap < -0.45 * body.contact.distance)
       throw SceneError("body '" + body.name + "' is drawn " + shortText(-o.gap) + " m deep in collider '" +
@@ -139,7 +153,7 @@ void refuseWithObstacles(const Options &o) {
   const bool estimates = o.error_estimate && !o.loop.dynamic;
   if (!o.accuracy && !estimates && !arc) return;
   const std::string option = arc ? "-continuation arclength" : o.accuracy ? "-accuracy" : "-error_estimate";
-  throw SceneError("option " + option + ": is not for scenes with 'colliders' yet; " +
+  throw SceneError("option " + option + ": is not for scenes with 'colliders' or rods that touch each other yet; " +
                    (arc ? "take load steps" : "compare runs with -rod_edges, and with other values of -dt"));
 }
 
@@ -197,16 +211,34 @@ void guarded(const std::function<PetscErrorCode()> &work) {
   if (work()) throw SceneError("setting up the solvers: " + errors.message());
 }
 
+/// Methods that go on beyond the middle of a step may go through rods there, and friction between rods is not for
+/// statics yet.
+void refuseWithRodContact(const Scene &scene, const Options &o, std::vector<std::string> *notes) {
+  if (!scene.touchesRods()) return;
+  const std::string &name = o.loop.integrator.name;
+  if (o.loop.dynamic && (name == "midpoint" || name == "symplectic2" || name == "energy_momentum" || name == "sdirk23"))
+    throw SceneError("option -integrator " + name +
+                     ": is not for rods that touch each other ('contact: {rods: ...}'), which the ends of its steps "
+                     "may go through; take euler, bdf2 or generalized_alpha");
+  for (const Rod &rod : scene.rods)
+    if (!o.loop.dynamic && rod.contact.touchesRods() && rod.contact.slides())
+      return notes->push_back("warning: the friction of rod '" + rod.name +
+                              "' acts on other rods in steps of time only: in statics rods slide along each other "
+                              "without");
+}
+
 /// A path of equilibria has one load factor for all rods, which makes them one island.
 void makeReady(Scene scene, const Options &o, Prepared &prepared) {
   const Team world = Team::world();
   const bool path = !o.loop.dynamic && o.loop.continuation == Continuation::arclength;
-  const Partition parts = partition(scene, path ? 1 : world.size(), o.partition);
+  const bool among = scene.touchesRods();
+  const Partition parts = partition(scene, path || among ? 1 : world.size(), o.partition);
   const Team &team = prepared.team = world.first(parts.ranks);
   prepared.ranks.clear();
-  if (!world.isAlone() && path)
-    prepared.ranks = {"warning: with -continuation arclength all rods share one load factor and run on one rank; the "
-                      "other " +
+  if (!world.isAlone() && (path || among))
+    prepared.ranks = {(among ? "warning: rods that touch each other run on one rank yet; the other "
+                             : std::string("warning: with -continuation arclength all rods share one load factor and "
+                                           "run on one rank; the other ")) +
                       std::to_string(world.size() - 1) + " have nothing to do"};
   else if (!world.isAlone())
     prepared.ranks = describe(parts, scene, world.size());
@@ -232,7 +264,8 @@ void makeReady(Scene scene, const Options &o, Prepared &prepared) {
   world.together([&] {
     if (!run) return;
     if (team.leads() && o.loop.dynamic && o.restart.empty()) refuseTearing(prepared.whole());
-    if (team.leads() && !prepared.whole().scene.colliders.empty() && o.restart.empty())
+    const Scene &all = prepared.whole().scene;
+    if (team.leads() && (!all.colliders.empty() || all.touchesRods()) && o.restart.empty())
       refuseOverlaps(prepared.whole());
     guarded([&] { return run->solver.rehearse(run->state, TimeLoop::stepOf(o.loop, run->state, o.loop.dt)); });
   });
@@ -270,7 +303,8 @@ static Scene sceneFor(Prepared &prepared, Options &o) {
           std::string("option ") + (o.accuracy ? "-accuracy" : "-error_estimate") + ": constraint '" + c.name +
           "' turns an edge, whose middle moves when edges change: errors do not fall with the square of their "
           "length; take a clamp, or compare runs with -rod_edges");
-  if (!file.scene.colliders.empty()) refuseWithObstacles(o);
+  if (!file.scene.colliders.empty() || file.scene.touchesRods()) refuseWithObstacles(o);
+  refuseWithRodContact(file.scene, o, &prepared.notes);
   refuseWithJoints(file.scene, o, &prepared.notes);
   refuseFrictionOfBodies(file.scene, o);
   tellOfImpacts(file.scene, o, &prepared.notes);

@@ -88,7 +88,10 @@ std::string textOf(const ContactSettings &c) {
          std::to_string(c.quadrature) + ", friction " + textOf(c.friction) +
          (c.friction_at_surface ? " at the surface" : " at the centreline") + ", falling off below " +
          textOf(c.fall_off_velocity) + " and " + textOf(c.slip_length) + ", damping " + textOf(c.tangential_damping) +
-         " and " + textOf(c.normal_damping) + stick + passes;
+         " and " + textOf(c.normal_damping) + stick + passes +
+         (!c.touchesRods()                       ? ""
+          : c.rods == ContactSettings::Rods::all ? ", with all rods"
+                                                 : ", with other rods");
 }
 
 std::string textOf(const Collider &c) {
@@ -288,7 +291,8 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
   add(Kind::scene, order_of_holders, "#" + holders.hex());
   for (const Collider &c : scene.colliders) add(Kind::scene, "collider '" + c.name + "'", textOf(c));
   for (const Rod &rod : scene.rods)
-    if (!scene.colliders.empty()) add(Kind::scene, "contact of rod '" + rod.name + "'", textOf(rod.contact));
+    if (!scene.colliders.empty() || rod.contact.touchesRods())
+      add(Kind::scene, "contact of rod '" + rod.name + "'", textOf(rod.contact));
   for (const NodalForce &f : scene.forces)
     if (f.mass > 0) add(Kind::scene, at("mass on vertex ", f.vertex, f.rod), textOf(f.mass));
   for (const NodalForce &f : scene.forces) add(Kind::load, at("force on vertex ", f.vertex, f.rod), textOf(f.force));

@@ -81,7 +81,7 @@ void refuseTravel(const YamlValue &motion, const Motion &m, const std::string &a
 
 namespace {
 
-constexpr MotionKeys motion_keys{"supports[].motion", "supports[].motion.velocity",
+constexpr MotionKeys support_motion_keys{"supports[].motion", "supports[].motion.velocity",
                                  "supports[].motion.angular_velocity", "supports[].motion.table"};
 
 /// A motion that is elsewhere at the start than the rod as drawn.
@@ -136,7 +136,7 @@ void readSupport(const YamlValue &value, SceneFile &out) {
       value.fail("rod '" + rod.name + "' has no flexural stiffness and no twist to fix");
     if (map.has("supports[].motion")) {
       const YamlValue motion = map.at("supports[].motion");
-      s.motion = readMotion(motion, motion_keys);
+      s.motion = readMotion(motion, support_motion_keys);
       if (type == "pin")
         refuseTurning(motion, s.motion, "a pin holds no rotation; take it away or write 'type: clamp'");
       if (type == "fix_twist")

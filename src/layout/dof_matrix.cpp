@@ -23,10 +23,12 @@ std::unordered_map<int, int> DofMap::firstSlots(RodSet rods) const {
 
 PetscErrorCode DofMap::createMatrix(RodSet rods, bool joins, Mat *matrix, Pattern *pattern) const {
   PetscFunctionBeginUser;
-  std::vector<PetscInt> row, column;
+  std::vector<PetscInt> &row = pattern->row, &column = pattern->column;
   std::vector<std::ptrdiff_t> &source_of = pattern->source;
-  source_of.clear();
-  pattern->factor.clear();
+  row.resize(pattern->lasting);
+  column.resize(pattern->lasting);
+  source_of.resize(pattern->lasting);
+  if (!pattern->factor.empty()) pattern->factor.resize(pattern->lasting);
   EdgeBlocks blocks(0, joins); // for its window
   blocks.setOrigin(rods_[rods.begin].first_slot);
   const PetscInt first = firstUnknown(rods);
@@ -47,7 +49,21 @@ PetscErrorCode DofMap::createMatrix(RodSet rods, bool joins, Mat *matrix, Patter
     parts.push_back({unknown(found->second->first_frame, b), minus, arm + c});
     parts.push_back({unknown(found->second->first_frame, c), !minus, arm + b});
   };
-  for (int r = rods.begin; r < rods.end; ++r) {
+  auto coupleFrom = [&](std::ptrdiff_t source, const std::vector<Part> &left, const std::vector<Part> &right,
+                        bool once) {
+    for (const Part &a : left)
+      for (const Part &b : right) {
+        if (a.unknown < 0 || b.unknown < 0) continue;
+        for (const bool mirrored : {false, true}) {
+          if (mirrored && once) continue;
+          row.push_back((mirrored ? b.unknown : a.unknown) - first);
+          column.push_back((mirrored ? a.unknown : b.unknown) - first);
+          source_of.push_back(a.minus == b.minus ? source : ~source);
+          if (!on_body.empty()) pattern->factor.push_back({a.factor, b.factor});
+        }
+      }
+  };
+  for (int r = rods.begin; r < rods.end && pattern->lasting == 0; ++r) {
     const RodRange &rod = rods_[r];
     auto slot = [&](int i) { return rod.slot(rod.closed ? i % rod.vertices : i); };
     auto edge = [&](int i, int r) {
@@ -66,18 +82,7 @@ PetscErrorCode DofMap::createMatrix(RodSet rods, bool joins, Mat *matrix, Patter
       return parts;
     };
     auto couple = [&](const std::vector<Part> &left, const std::vector<Part> &right, int plane, int i, bool once) {
-      const std::ptrdiff_t source = std::ptrdiff_t(blocks.offset(rod, plane)) + i;
-      for (const Part &a : left)
-        for (const Part &b : right) {
-          if (a.unknown < 0 || b.unknown < 0) continue;
-          for (const bool mirrored : {false, true}) {
-            if (mirrored && once) continue;
-            row.push_back((mirrored ? b.unknown : a.unknown) - first);
-            column.push_back((mirrored ? a.unknown : b.unknown) - first);
-            source_of.push_back(a.minus == b.minus ? source : ~source);
-            if (!on_body.empty()) pattern->factor.push_back({a.factor, b.factor});
-          }
-        }
+      coupleFrom(std::ptrdiff_t(blocks.offset(rod, plane)) + i, left, right, once);
     };
     for (int i = 0; i < rod.edges; ++i)
       for (int r = 0; r < edge_size; ++r)
@@ -128,13 +133,32 @@ PetscErrorCode DofMap::createMatrix(RodSet rods, bool joins, Mat *matrix, Patter
           couple(difference(a), difference(c), EdgeBlocks::vertex(a, c), t.copy - rod.first_slot, a == c);
     }
   }
+  pattern->lasting = source_of.size();
+  for (const int number : pattern->touching) {
+    const EdgePair &p = touching_.items[std::size_t(number)];
+    const int variables = pattern->turns ? EdgePair::variables : 6;
+    auto parts = [&](int side, int variable) {
+      const auto [slot, a] = p.place(side, variable);
+      std::vector<Part> parts;
+      if (a == 3)
+        parts = {{unknown(slot, 3), false}};
+      else
+        addPosition(parts, slot, a, false);
+      return parts;
+    };
+    for (int i = 0; i < variables; ++i)
+      for (int j = 0; j < variables; ++j)
+        coupleFrom(EdgeBlocks::touching_place + EdgeBlocks::touching_size * number + EdgePair::variables * i + j,
+                   parts(0, i), parts(1, j), false);
+  }
   PetscCall(MatCreate(PETSC_COMM_SELF, matrix));
   PetscCall(MatSetSizes(*matrix, unknowns(rods), unknowns(rods), PETSC_DETERMINE, PETSC_DETERMINE));
   PetscCall(MatSetType(*matrix, MATAIJ));
   PetscCall(MatSetFromOptions(*matrix));
   PetscCall(MatSetOption(*matrix, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(MatSetOption(*matrix, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
-  PetscCall(MatSetPreallocationCOO(*matrix, PetscCount(row.size()), row.data(), column.data()));
+  std::vector<PetscInt> rows = row, columns = column; // PETSc sorts them
+  PetscCall(MatSetPreallocationCOO(*matrix, PetscCount(rows.size()), rows.data(), columns.data()));
   pattern->entries.resize(source_of.size());
   PetscFunctionReturn(0);
 }
@@ -143,7 +167,7 @@ PetscErrorCode DofMap::fillMatrix(const EdgeBlocks &blocks, Pattern &pattern, Ma
   PetscFunctionBeginUser;
   for (std::size_t n = 0; n < pattern.source.size(); ++n) {
     const std::ptrdiff_t from = pattern.source[n];
-    pattern.entries[n] = from >= 0 ? blocks.data()[from] : -blocks.data()[~from];
+    pattern.entries[n] = from >= 0 ? blocks.at(from) : -blocks.at(~from);
   }
   for (std::size_t n = 0; n < pattern.factor.size(); ++n)
     for (const int f : pattern.factor[n])

@@ -6,6 +6,7 @@ void EdgeBlocks::clear(const RodRange &rod) { std::fill_n(entry(rod, 0) - 1, std
 
 void EdgeBlocks::subtractFrom(const EdgeBlocks &other) {
   for (std::size_t k = 0; k < data_.size(); ++k) data_[k] = other.data_[k] - data_[k];
+  for (std::size_t k = 0; k < touching_.size(); ++k) touching_[k] = other.touching_[k] - touching_[k];
 }
 
 /// What the last edge has with the first stays behind the ring.
@@ -98,6 +99,15 @@ void EdgeBlocks::multiply(const RodRange &rod, const Joins &of, const Planes &x,
         y[r][t.copy] -= force;
       }
   }
+  for (const EdgePair &p : of.touching)
+    for (int r = 0; r < EdgePair::variables; ++r)
+      for (int c = 0; c < EdgePair::variables; ++c) {
+        const double v = touching(p.number)[EdgePair::variables * r + c];
+        const auto [row, a] = p.place(0, r);
+        const auto [column, b] = p.place(1, c);
+        y[a][row] += v * x[b][column];
+        y[b][column] += v * x[a][row];
+      }
 }
 
 double EdgeBlocks::magnitude(const RodRange &rod, const Joins &of, const Planes &x) const {
@@ -149,6 +159,13 @@ double EdgeBlocks::magnitude(const RodRange &rod, const Joins &of, const Planes 
       for (int c = r; c < 3; ++c)
         sum += std::pow((r == c ? 1 : 2) * entry(rod, vertex(r, c))[t.copy - rod.first_slot] * moved[r] * moved[c], 2);
   }
+  for (const EdgePair &p : of.touching)
+    for (int r = 0; r < EdgePair::variables; ++r)
+      for (int c = 0; c < EdgePair::variables; ++c) {
+        const auto [row, a] = p.place(0, r);
+        const auto [column, b] = p.place(1, c);
+        sum += std::pow(2 * touching(p.number)[EdgePair::variables * r + c] * x[a][row] * x[b][column], 2);
+      }
   return std::sqrt(sum);
 }
 

@@ -11,6 +11,18 @@ void DofMap::makeIsland(RodSet a, RodSet b) {
   for (int r = island.begin; r < island.end; ++r) islands_[r] = island;
 }
 
+void DofMap::setTouching(std::vector<EdgePair> pairs) {
+  touching_ = {};
+  touching_.items = std::move(pairs);
+  for (std::size_t k = 0; k < touching_.items.size(); ++k) touching_.items[k].number = int(k);
+  if (!touching_.items.empty()) touching_.sort(rods_.size());
+  islands_ = lasting_;
+  if (islands_.empty() && !touching_.items.empty())
+    for (int r = 0; r < int(rods_.size()); ++r) islands_.push_back({r, r + 1});
+  for (const EdgePair &p : touching_.items)
+    if (p.to_rod != p.rod) makeIsland(islands_[p.to_rod], islands_[p.rod]);
+}
+
 /// Ties the edges beside a vertex to the frame of a group, each by a frame and a half cell of its own. \param joined of
 /// the first frame, or with that below 0: it is that of the first edge then
 void DofMap::tieEdges(const Scene &scene, JoinedEdge joined, std::vector<int> &free_slots) {
@@ -140,6 +152,7 @@ void DofMap::join(const Scene &scene, std::vector<int> free_slots) {
   bodies_.sort(rods_.size());
   pairs_.sort(rods_.size());
   arms_.assign(joined_vertices_.items.size(), Vec3::Zero());
+  lasting_ = islands_;
 }
 
 void DofMap::copyJoined(RodSet islands, Planes &increment) const {

@@ -8,7 +8,7 @@
 namespace tendril {
 namespace {
 
-template <class T> T *as(double *p) { return reinterpret_cast<T *>(p); }
+template <class T> T *valuesAs(double *p) { return reinterpret_cast<T *>(p); }
 
 } // namespace
 
@@ -113,9 +113,9 @@ void CondensedFactor::solve(const PetscScalar *b, PetscScalar *x) {
 template <class T> void CondensedFactor::solveTo(const Group &group, const PetscScalar *b) {
   const Run &first = runs_[group.run[0]];
   eachValue<T>(group, [&](double &value, PetscInt u) { value = u < 0 ? 0 : b[u]; });
-  const T *const vertex = as<T>(&records_[group.record]), *const records = vertex + bordered_vertex_record;
+  const T *const vertex = valuesAs<T>(&records_[group.record]), *const records = vertex + bordered_vertex_record;
   T near[state_size], far[state_size];
-  T *const values = as<T>(&values_[group.value]);
+  T *const values = valuesAs<T>(&values_[group.value]);
   auto go = [&]<Border border>() {
     Substitution<T, border>({0, first.edges, first.from_through}, first.held, records, vertex)
         .toFirst(values, near, far);
@@ -153,9 +153,9 @@ template <class T> void CondensedFactor::solveTo(const Group &group, const Petsc
 
 template <class T> void CondensedFactor::solveFrom(const Group &group, PetscScalar *x) {
   const Run &first = runs_[group.run[0]];
-  const T *const vertex = as<T>(&records_[group.record]), *const records = vertex + bordered_vertex_record;
+  const T *const vertex = valuesAs<T>(&records_[group.record]), *const records = vertex + bordered_vertex_record;
   T near[state_size], far[state_size];
-  T *const values = as<T>(&values_[group.value]);
+  T *const values = valuesAs<T>(&values_[group.value]);
   auto ends = [&](const Places Run::*places, const JoinedVertex *Run::*point, T(&to)[state_size]) {
     for (int k = 0; k < state_size; ++k) {
       auto of_lane = [&](int l) {

@@ -20,7 +20,8 @@ IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, con
           std::any_of(terms_.begin(), terms_.end(), [](const auto &term) { return term->couplesPositions(); })),
       joins_positions_(
           std::any_of(terms_.begin(), terms_.end(), [](const auto &term) { return term->joinsPositions(); })),
-      obstacles_move_(scene.collidersMove()), obstacles_held_(scene.rods.size(), false) {}
+      touches_rods_(scene.touchesRods()), obstacles_move_(scene.collidersMove()),
+      obstacles_held_(scene.rods.size(), false) {}
 
 void IncrementalPotential::beginStep(const State &start, const Step &step) {
   start_time_ = start.time;
@@ -49,6 +50,20 @@ void IncrementalPotential::beginRod(const State &start, int r) {
   supports_.follow(r, iterate_);
   scales_[r].force = tendril::forceScale(scene_, elements_, step_, start, scales_[r], r);
   known(r) = Known::nothing;
+}
+
+void IncrementalPotential::findTouching(const State &start, double room) {
+  Planes way = dofs_.makePlanes();
+  remainingMotion(all(), way);
+  for (int v = 0; v < elements_.vertices() && step_.rule; ++v)
+    if (const int s = elements_.vertex_slot[v]; elements_.freedom()[s] != 0)
+      way.setVector(0, s, step_.rule->guess.atVertex(v));
+  std::vector<EdgePair> pairs;
+  for (auto &term : terms_)
+    for (EdgePair &p : term->findTouching(start, start_, way, step_, room)) pairs.push_back(p);
+  dofs_.setTouching(std::move(pairs));
+  derivatives_.blocks.setTouching(dofs_.touching().items.size());
+  std::fill(known_.begin(), known_.end(), Known::nothing);
 }
 
 void IncrementalPotential::setLoadFactor(double factor) {
@@ -162,6 +177,10 @@ void IncrementalPotential::assemble(RodSet islands, HessianKind hessian) {
       for (int b = a; b < 3; ++b)
         derivatives_.blocks.entry(rod, EdgeBlocks::vertex(a, b))[body.rotation - rod.first_slot] += more(a, b);
   }
+  for (const EdgePair &p : dofs_.touching(islands))
+    if (hessian != HessianKind::none)
+      std::fill_n(derivatives_.blocks.touching(p.number), EdgeBlocks::touching_size, 0.0);
+  for (const auto &term : terms_) term->addBetween(iterate_, islands, derivatives_, hessian);
   dofs_.foldJoined(islands, derivatives_.gradient);
   dofs_.foldJoined(islands, derivatives_.equilibrium);
 }
@@ -197,6 +216,7 @@ void IncrementalPotential::focus(RodSet rods) {
   if (dofs_.slots(rods) > workspace_slots_) {
     workspace_slots_ = dofs_.slots(rods);
     derivatives_ = Derivatives(workspace_slots_, joinsPositions());
+    derivatives_.blocks.setTouching(dofs_.touching().items.size());
   }
   derivatives_.setOrigin(elements_.rods[rods.begin].first_slot);
 }

@@ -193,10 +193,11 @@ bool IncrementalPotential::moveTo(const Planes &x, RodSet rods, bool supports) {
     dofs_.copyBehindRing(rod, increment);
   }
   dofs_.copyJoined(rods, increment);
-  for (int r = rods.begin; r < rods.end; ++r) {
-    if (dofs_.dot(dofs_.islandOf(r), increment, increment) == 0) continue;
-    if (!tryMove(increment, 1.0, r, RetractionKind::additive, trial)) return false;
-    accept(trial, r);
+  for (int begin = rods.begin; begin < rods.end; begin = dofs_.islandOf(begin).end) {
+    const RodSet island = dofs_.islandOf(begin);
+    if (dofs_.dot(island, increment, increment) == 0) continue;
+    if (!tryMove(increment, 1.0, island, RetractionKind::additive, trial)) return false;
+    for (int r = island.begin; r < island.end; ++r) accept(trial, r);
   }
   return true;
 }

@@ -162,6 +162,7 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
   rtol_ = rtol *= sharpness_;
   report_.iterations = int(iteration);
   constexpr double rtol_obstacles = 0.1;
+  constexpr int most_bounded = 8; // trials
   const bool moving = potential_->remainingMotion(rods_, work_->motion);
   bool done = true, finite = true, lost = false;
   creeps_ = false;
@@ -201,8 +202,12 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
     *reason = SNES_DIVERGED_LOCAL_MIN; // its meaning here: what is left is rounding
   else if (done)
     *reason = SNES_CONVERGED_FNORM_RELATIVE;
+  else if (potential_->timesBounded(rods_) > most_bounded)
+    *reason = SNES_DIVERGED_FUNCTION_COUNT; // its meaning here: rods leave the room in which contact is known
   else if (iteration >= limit || (patience_ > 0 && spent_ + iteration >= patience_))
     *reason = SNES_DIVERGED_MAX_IT;
+  else if (touches_ && !sharesFactor()) // for the next direction; SNES takes a matrix of other entries here
+    PetscCall(makeMatrix());
   PetscFunctionReturn(0);
 }
 
@@ -213,6 +218,7 @@ PetscErrorCode NewtonSolver::inertiaAtIterate(int *negative, double lift) {
   focus();
   fill(work_->active, true);
   age_ = 0;
+  PetscCall(makeMatrix());
   PetscCall(assemble(jacobian_));
   for (const RodSet island : islands_) {
     if (potential_->step().hessian != HessianKind::exact) potential_->assemble(island, HessianKind::exact);
@@ -271,6 +277,10 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
     case SNES_DIVERGED_FNORM_NAN:
     case SNES_DIVERGED_FUNCTION_DOMAIN:
       *failure = "the forces are not finite";
+      break;
+    case SNES_DIVERGED_FUNCTION_COUNT:
+      report_.bounded = true;
+      *failure = "rods move farther than contact between them was looked for";
       break;
     case SNES_DIVERGED_LINEAR_SOLVE:
       *failure = "the linear solve failed";

@@ -1,7 +1,11 @@
 /// How SNES and its parts are made, and what they call.
+#include "tendril/contact/neighbours.hpp"
 #include "tendril/solver/newton.hpp"
 
 #include <petsc/private/linesearchimpl.h>
+
+#include <algorithm>
+#include <utility>
 
 namespace tendril {
 namespace {
@@ -80,10 +84,10 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
   rods_ = set;
   DofMap &dofs = potential.dofs();
   work_ = &work;
-  const bool joined = potential.dofs().isJoined(set);
+  const bool joined = potential.dofs().isCoupled(set);
   islands_.clear();
   for (int r = set.begin; r < set.end; ++r)
-    if (joined) { // all of a block that has junctions
+    if (joined) { // all of a block that has junctions or contact
       islands_ = {set};
       break;
     } else
@@ -109,9 +113,9 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
   if (banded_) // factored straight from the band; every other solver gets a matrix of PETSc's own
     PetscCall(createBandedMatrix(&system_, jacobian_.out()));
   else
-    PetscCall(dofs.createMatrix(set, potential.joinsPositions(), jacobian_.out(), &pattern_));
+    PetscCall(makeMatrix());
   PetscCall(SNESSetJacobian(snes_, jacobian_, jacobian_, jacobianCallback, this));
-  if (type && std::string(type) == MATSOLVERMUMPS) PetscCall(askMumpsForInertia(pc, jacobian_));
+  takeTouching();
   if (!banded_ && (!cholesky || islands_.size() > 1)) {
     PetscCall(createBandedMatrix(&system_, band_.out()));
     PetscCall(KSPCreate(PETSC_COMM_SELF, inertia_.out()));
@@ -125,6 +129,52 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
     PetscCall(PCFactorSetMatSolverType(pc, own));
     PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGNATURAL));
   }
+  PetscFunctionReturn(0);
+}
+
+void NewtonSolver::takeTouching() {
+  touches_ = !potential_->dofs().touching(rods_).empty();
+  fresh_pairs_ = true;
+}
+
+/// Makes a matrix of PETSc's own that has entries for the edges that touch at the iterate. What touches changes from
+/// iterate to iterate, and every other matrix has to be analysed: those that nearly touch have some, too, and those
+/// that did so earlier in the step keep theirs.
+PetscErrorCode NewtonSolver::makeMatrix() {
+  KSP ksp;
+  PC pc;
+  MatSolverType type = nullptr;
+  PetscFunctionBeginUser;
+  if (banded_) PetscFunctionReturn(0);
+  std::vector<int> &has = pattern_.touching;
+  const bool first = std::exchange(fresh_pairs_, false), before = !has.empty();
+  if (first) has.clear();
+  if (touches_ && jacobian_.object()) {
+    const EdgeBlocks &blocks = potential_->derivatives(rods_).blocks;
+    const Configuration &c = potential_->iterate();
+    bool complete = !first;
+    std::vector<int> near;
+    for (const EdgePair &p : potential_->dofs().touching(rods_)) {
+      const double *const entries = blocks.touching(p.number);
+      const bool kept = std::binary_search(has.begin(), has.end(), p.number),
+                 touches = std::any_of(entries, entries + EdgeBlocks::touching_size, [](double v) { return v != 0; });
+      complete = complete && (kept || !touches);
+      std::array<Vec3, 4> x;
+      for (std::size_t k = 0; k < 4; ++k) x[k] = c.displacements<double>(p.slot[k], c, p.slot[0]);
+      if (kept || touches || nearlyTouch(potential_->scene(), p, x)) near.push_back(p.number);
+    }
+    if (complete) PetscFunctionReturn(0);
+    has = std::move(near);
+  }
+  if (!before && has.empty() && jacobian_.object()) PetscFunctionReturn(0);
+  pattern_.turns = potential_->scene().slidesAmongRods();
+  PetscCall(SNESGetKSP(snes_, &ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(KSPReset(ksp));
+  PetscCall(potential_->dofs().createMatrix(rods_, potential_->joinsPositions(), jacobian_.out(), &pattern_));
+  PetscCall(SNESSetJacobian(snes_, jacobian_, jacobian_, jacobianCallback, this));
+  PetscCall(PCFactorGetMatSolverType(pc, &type));
+  if (type && std::string(type) == MATSOLVERMUMPS) PetscCall(askMumpsForInertia(pc, jacobian_));
   PetscFunctionReturn(0);
 }
 

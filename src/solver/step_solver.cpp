@@ -11,7 +11,7 @@ static std::vector<RodSet> blocksOf(const DofMap &dofs) {
   for (int r = 0; r < dofs.all().end; ++r) {
     const RodSet island = dofs.islandOf(r);
     edges.push_back(dofs.rods()[r].edges);
-    island_end.push_back(dofs.isJoined(island) ? island.end : 0);
+    island_end.push_back(dofs.isCoupled(island) ? island.end : 0);
   }
   std::vector<RodSet> blocks;
   for (const Block &block : blocksOf(edges, island_end)) blocks.push_back(block.rods);
@@ -22,17 +22,33 @@ PetscErrorCode StepSolver::setUp(IncrementalPotential &potential, Coupling coupl
   PetscFunctionBeginUser;
   potential_ = &potential;
   share_ = share;
-  std::vector<RodSet> blocks;
-  if (coupling == Coupling::none) blocks = share.blocks.empty() ? blocksOf(potential.dofs()) : share.blocks;
-  if (blocks.size() > 1) {
-    PetscCall(setUpBlocks(blocks));
-    if (blocks_.size() == blocks.size()) PetscFunctionReturn(0);
-  }
-  PetscCall(setUpBlocks({potential.all()}));
+  coupling_ = coupling;
+  PetscCall(setUpBlocks(wantedBlocks()));
   PetscFunctionReturn(0);
 }
 
-/// Stops where another solver than `banded` was chosen for rods that nothing joins, which needs all of them as one.
+std::vector<RodSet> StepSolver::wantedBlocks() const {
+  if (coupling_ != Coupling::none) return {potential_->all()};
+  return share_.blocks.empty() ? blocksOf(potential_->dofs()) : share_.blocks;
+}
+
+/// Finds what may touch in the step that has begun, and makes solvers for the islands that it joins.
+PetscErrorCode StepSolver::findTouching(const State &start, double room) {
+  PetscFunctionBeginUser;
+  if (!potential_->touchesRods()) PetscFunctionReturn(0);
+  DofMap &dofs = potential_->dofs();
+  potential_->findTouching(start, room);
+  const std::vector<RodSet> blocks = wantedBlocks();
+  const bool same = std::equal(
+      blocks.begin(), blocks.end(), blocks_.begin(), blocks_.end(), [&](const RodSet &a, const NewtonSolver &b) {
+        return a.begin == b.rods().begin && a.end == b.rods().end && b.touches() == !dofs.touching(a).empty();
+      });
+  if (!same) PetscCall(setUpBlocks(blocks));
+  for (NewtonSolver &block : blocks_) block.takeTouching();
+  PetscFunctionReturn(0);
+}
+
+/// Where another solver than `banded` was chosen for rods that nothing joins, it needs all of them as one.
 PetscErrorCode StepSolver::setUpBlocks(const std::vector<RodSet> &blocks) {
   PetscFunctionBeginUser;
   int slots = 0;
@@ -41,20 +57,43 @@ PetscErrorCode StepSolver::setUpBlocks(const std::vector<RodSet> &blocks) {
   work_.emplace(*potential_, slots);
   for (const RodSet &block : blocks) {
     PetscCall(blocks_.emplace_back().setUp(*potential_, *work_, block));
-    if (!blocks_.back().isBanded() && !potential_->dofs().isJoined(block)) break;
+    if (blocks.size() > 1 && !blocks_.back().isBanded() && !potential_->dofs().isCoupled(block)) {
+      PetscCall(setUpBlocks({potential_->all()}));
+      break;
+    }
   }
   PetscFunctionReturn(0);
 }
 
-void StepSolver::begin(const State &start, const Step &step) {
+PetscErrorCode StepSolver::begin(const State &start, const Step &step) {
+  PetscFunctionBeginUser;
   potential_->beginStep(start, step);
   for (int r = 0; r < potential_->all().end; ++r) potential_->beginRod(start, r);
+  PetscCall(findTouching(start, 1));
+  PetscFunctionReturn(0);
 }
+
+/// Room for contact, over what rods are expected to move: beyond it every edge may touch every other.
+constexpr double most_room = 1e4;
 
 PetscErrorCode StepSolver::solve(const State &start, const Step &step, NewtonReport *report, Seek seek,
                                  const Guess *guess) {
   PetscFunctionBeginUser;
-  potential_->beginStep(start, step);
+  if (potential_->touchesRods())
+    PetscCall(begin(start, step));
+  else
+    potential_->beginStep(start, step); // blocks begin with their rods, while these are in the cache
+  for (double room = 4;; room *= 4) {
+    PetscCall(solveBlocks(start, step, report, seek, guess));
+    if (!report->bounded || room > most_room) break;
+    PetscCall(findTouching(start, room));
+  }
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode StepSolver::solveBlocks(const State &start, const Step &step, NewtonReport *report, Seek seek,
+                                       const Guess *guess) {
+  PetscFunctionBeginUser;
   *report = {};
   report->converged = true;
   report->reason = "converged";
@@ -113,7 +152,7 @@ PetscErrorCode StepSolver::solveBlock(NewtonSolver &block, const State &start, N
   constexpr int patience = 10;
   PetscFunctionBeginUser;
   const std::vector<RodRange> &rods = potential_->elements().rods;
-  const bool fine = !potential_->dofs().isJoined(block.rods()) &&
+  const bool fine = !potential_->dofs().isCoupled(block.rods()) &&
                     std::any_of(rods.begin() + block.rods().begin, rods.begin() + block.rods().end,
                                 [](const RodRange &rod) { return rod.edges > fine_edges; });
   NewtonReport failed; // what tries took that led nowhere
@@ -142,7 +181,7 @@ PetscErrorCode StepSolver::solveBlock(NewtonSolver &block, const State &start, N
 
 PetscErrorCode StepSolver::rehearse(const State &start, const Step &step) {
   PetscFunctionBeginUser;
-  begin(start, step);
+  PetscCall(begin(start, step));
   for (NewtonSolver &block : blocks_) {
     int negative;
     PetscCall(block.inertiaAtIterate(&negative));

@@ -213,6 +213,7 @@ PetscErrorCode WoodburyFactor::view(PetscViewer viewer) const {
 PetscErrorCode registerWoodbury() { return FactorType<WoodburyFactor>::add(); }
 
 const char *ownSolver(const DofMap &dofs, RodSet rods) {
+  if (!dofs.touching(rods).empty()) return nullptr;
   if (!dofs.isJoined(rods)) return BandedFactor::name;
   if (!dofs.ties(rods).empty())
     return WoodburyFactor::suits(dofs, rods) && WoodburyFactor::pays(dofs, rods) ? WoodburyFactor::name : nullptr;
@@ -220,8 +221,8 @@ const char *ownSolver(const DofMap &dofs, RodSet rods) {
 }
 
 bool canFactor(const std::string &solver, const DofMap &dofs, RodSet rods) {
-  if (solver == WoodburyFactor::name) return WoodburyFactor::suits(dofs, rods);
-  if (!dofs.ties(rods).empty()) return false;
+  if (solver == WoodburyFactor::name) return WoodburyFactor::suits(dofs, rods) && dofs.touching(rods).empty();
+  if (!dofs.ties(rods).empty() || !dofs.touching(rods).empty()) return false;
   return solver == CondensedFactor::name ? CondensedFactor::suits(dofs, rods) : !dofs.isJoined(rods);
 }
 

@@ -9,7 +9,7 @@
 namespace tendril::test {
 namespace {
 
-constexpr double g = 9.81;
+constexpr double earth = 9.81;
 
 Body shaped(const std::string &shape, const Vec3 &size, const Vec3 &at, const Mat3 &turn = Mat3::Identity()) {
   Body body;
@@ -38,7 +38,7 @@ Collider floor() {
 /// Over the plane z = 0, with gravity leaning by an angle towards x; and a rod at rest, for every scene has one.
 Scene slope(double angle, const Body &body) {
   Scene scene;
-  scene.gravity = g * Vec3(std::sin(angle), 0, -std::cos(angle));
+  scene.gravity = earth * Vec3(std::sin(angle), 0, -std::cos(angle));
   scene.rods = {beam({0, 5, 5}, {1, 5, 5}, 2, "rest")};
   scene.rods[0].gravity = scene.rods[0].contact.on = false;
   scene.supports = {hold(scene, 0, 0, Support::Kind::clamp)};
@@ -78,8 +78,8 @@ TEST(BodyContact, ABoxSlidesOrStays) {
     box.contact.fall_off_velocity = 1e-3;
     Simulation run;
     runTo(run, slope(angle, box), by("bdf2", 5e-3, 0.5));
-    const double acceleration = std::max(0.0, g * (std::sin(angle) - friction * std::cos(angle)));
-    EXPECT_NEAR(run.state.body_rate[0].translation[0], 0.5 * acceleration, 0.02 * g * 0.5) << friction;
+    const double acceleration = std::max(0.0, earth * (std::sin(angle) - friction * std::cos(angle)));
+    EXPECT_NEAR(run.state.body_rate[0].translation[0], 0.5 * acceleration, 0.02 * earth * 0.5) << friction;
     if (friction == 0.6) EXPECT_LT(run.state.body_position[0][0], 2e-3) << friction; // creeps below the fall-off
     EXPECT_NEAR(run.state.body_rate[0].spin.norm(), 0, 0.05) << friction;
   }
@@ -102,7 +102,7 @@ TEST(BodyContact, ATallBoxTips) {
 
 /// A ball rolls down by 5/7 of the slope, a cylinder across it by 2/3, and without friction they slide.
 TEST(BodyContact, BallsAndCylindersRoll) {
-  const double angle = 0.2, pull = g * std::sin(angle);
+  const double angle = 0.2, pull = earth * std::sin(angle);
   for (const std::string shape : {"sphere", "capsule", "cylinder"})
     for (const double friction : {0.0, 0.6}) {
       const Mat3 across = Eigen::AngleAxisd(pi / 2, Vec3::UnitX()).toRotationMatrix(); // its axis along y

@@ -11,29 +11,29 @@
 namespace tendril::test {
 namespace {
 
-using D = Dual<4>;
+using D4 = Dual<4>;
 
 /// Columns of the frame of an edge whose vector and twist change.
-Matrix3<D> movedFrame(const Frame &f) {
-  Vector3<D> e, t, d;
+Matrix3<D4> movedFrame(const Frame &f) {
+  Vector3<D4> e, t, d;
   for (int a = 0; a < 3; ++a) {
-    e[a] = D::variable(f.tangent[a] * f.length, a);
+    e[a] = D4::variable(f.tangent[a] * f.length, a);
     t[a] = f.tangent[a];
     d[a] = f.director[a];
   }
-  const Vector3<D> tangent = e / sqrt(e.squaredNorm());
-  const Vector3<D> director = rotateAbout<D>(transport<D>(d, t, tangent), tangent, D::variable(0, 3));
-  Matrix3<D> m;
+  const Vector3<D4> tangent = e / sqrt(e.squaredNorm());
+  const Vector3<D4> director = rotateAbout<D4>(transport<D4>(d, t, tangent), tangent, D4::variable(0, 3));
+  Matrix3<D4> m;
   m << tangent, director, tangent.cross(director);
   return m;
 }
 
 /// Angle of the rotation from one matrix to another, by its trace and its antisymmetric part.
-D angleOf(const Mat3 &from, const Matrix3<D> &to) {
-  Matrix3<D> q;
+D4 angleOf(const Mat3 &from, const Matrix3<D4> &to) {
+  Matrix3<D4> q;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) q(i, j) = to(i, 0) * from(j, 0) + to(i, 1) * from(j, 1) + to(i, 2) * from(j, 2);
-  const Vector3<D> axial(q(2, 1) - q(1, 2), q(0, 2) - q(2, 0), q(1, 0) - q(0, 1));
+  const Vector3<D4> axial(q(2, 1) - q(1, 2), q(0, 2) - q(2, 0), q(1, 0) - q(0, 1));
   return atan2(sqrt(axial.squaredNorm()), q.trace() - 1.0);
 }
 
@@ -43,7 +43,7 @@ Frame randomFrame(Random &random) {
   return {t, orthonormalised(vector(), t), 0.3 + std::abs(random())};
 }
 
-void expectSame(const D &oracle, const EdgeDerivatives &d, const std::string &what) {
+void expectSame(const D4 &oracle, const EdgeDerivatives &d, const std::string &what) {
   const double scale = oracle.g.norm() + oracle.h.norm();
   EXPECT_LT((oracle.g - d.gradient).norm(), 1e-12 * scale) << what;
   EXPECT_LT((oracle.h - d.hessian).norm(), 1e-11 * scale) << what; // digits go at angles near 0 and half a turn
@@ -56,22 +56,22 @@ TEST(ConstraintKernels, AgreeWithAutomaticDifferentiation) {
     const Frame edge = randomFrame(random), target = randomFrame(random);
     const Vec3 g = rotationBetween(target, edge);
     if (g.norm() > 3 || g.norm() < 0.1) continue;
-    const D angle = angleOf(matrixOf(target), movedFrame(edge));
+    const D4 angle = angleOf(matrixOf(target), movedFrame(edge));
     EXPECT_NEAR(angle.v, g.norm(), 1e-12);
     Constraint c = constraintOn(0, 0, Constraint::Kind::rotation, 3);
-    expectSame(D(1.5) * angle * angle, overEdge(edge, rotationDerivatives(c, g), true), "angle");
+    expectSame(D4(1.5) * angle * angle, overEdge(edge, rotationDerivatives(c, g), true), "angle");
     c.measure = Constraint::Measure::sine;
-    expectSame(D(3.0) - D(3.0) * cos(angle), overEdge(edge, rotationDerivatives(c, g), true), "sine");
+    expectSame(D4(3.0) - D4(3.0) * cos(angle), overEdge(edge, rotationDerivatives(c, g), true), "sine");
     c.measure = Constraint::Measure::angle;
     c.saturation = 1.5;
-    const D below = D(3.0) * angle * angle - angle * angle * angle * (3 / 4.5), above = angle * 4.5 - D(2.25);
+    const D4 below = D4(3.0) * angle * angle - angle * angle * angle * (3 / 4.5), above = angle * 4.5 - D4(2.25);
     beyond += angle.v > 1.5;
     expectSame(angle.v > 1.5 ? above : below, overEdge(edge, rotationDerivatives(c, g), true), "saturation");
     EXPECT_NEAR(radialLaw(c, angle.v).value, (angle.v > 1.5 ? above : below).v, 1e-12);
     Mat3 a;
     for (int k = 0; k < 9; ++k) a.data()[k] = random();
-    const Matrix3<D> r = movedFrame(edge);
-    D chord(0.0);
+    const Matrix3<D4> r = movedFrame(edge);
+    D4 chord(0.0);
     for (int k = 0; k < 9; ++k) chord += (r.data()[k] - a.data()[k]) * (r.data()[k] - a.data()[k]) * 0.5;
     expectSame(chord, overEdge(edge, chordDerivatives(2, matrixOf(edge), a), true), "damper");
   }

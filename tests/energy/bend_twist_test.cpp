@@ -5,25 +5,25 @@
 namespace tendril::test {
 namespace {
 
-using D = Dual<cell_size>;
+using DCell = Dual<cell_size>;
 
 /// The retracted frame of an edge whose ends move by u0, u1 and whose director turns by theta.
-FrameOf<D> moved(const Frame &f, const Vector3<D> &u0, const Vector3<D> &u1, const D &theta, bool free) {
-  const Vector3<D> tangent = f.tangent.cast<D>(), director = f.director.cast<D>();
-  if (!free) return {tangent, director, D(f.length)};
-  const Vector3<D> e = tangent * D(f.length) + u1 - u0;
-  const D length = sqrt(e.squaredNorm());
-  const Vector3<D> t = e / length;
-  return {t, rotateAbout<D>(transport<D>(director, tangent, t), t, theta), length};
+FrameOf<DCell> moved(const Frame &f, const Vector3<DCell> &u0, const Vector3<DCell> &u1, const DCell &theta, bool free) {
+  const Vector3<DCell> tangent = f.tangent.cast<DCell>(), director = f.director.cast<DCell>();
+  if (!free) return {tangent, director, DCell(f.length)};
+  const Vector3<DCell> e = tangent * DCell(f.length) + u1 - u0;
+  const DCell length = sqrt(e.squaredNorm());
+  const Vector3<DCell> t = e / length;
+  return {t, rotateAbout<DCell>(transport<DCell>(director, tangent, t), t, theta), length};
 }
 
-template <Measure measure> D referenceEnergy(const RandomCell &c) {
-  std::array<D, cell_size> q;
-  for (int k = 0; k < cell_size; ++k) q[k] = D::variable(0.0, k);
-  const Vector3<D> u0(q[0], q[1], q[2]), u1(q[4], q[5], q[6]), u2(q[8], q[9], q[10]);
-  const FrameOf<D> f0 = moved(c.f0, u0, u1, q[3], c.cell.free[0] != 0),
+template <Measure measure> DCell referenceEnergy(const RandomCell &c) {
+  std::array<DCell, cell_size> q;
+  for (int k = 0; k < cell_size; ++k) q[k] = DCell::variable(0.0, k);
+  const Vector3<DCell> u0(q[0], q[1], q[2]), u1(q[4], q[5], q[6]), u2(q[8], q[9], q[10]);
+  const FrameOf<DCell> f0 = moved(c.f0, u0, u1, q[3], c.cell.free[0] != 0),
                    f1 = moved(c.f1, u1, u2, q[7], c.cell.free[1] != 0);
-  return cellEnergy<measure>(f0, f1, cast<D>(c.cell));
+  return cellEnergy<measure>(f0, f1, cast<DCell>(c.cell));
 }
 
 /// Vertex unknowns from edge variables: e0 = x1 - x0, e1 = x2 - x1.
@@ -40,7 +40,7 @@ Eigen::Matrix<double, cell_variables, cell_size> edgeVariables() {
 }
 
 template <Measure measure> void expectMatch(const RandomCell &c, double tolerance) {
-  const D reference = referenceEnergy<measure>(c);
+  const DCell reference = referenceEnergy<measure>(c);
   CellDerivatives<double> d;
   cellDerivatives<measure>(c.f0, c.f1, c.cell, d);
   double gradient_error = 0, hessian_error = 0;

@@ -113,26 +113,26 @@ TEST(Energy, RingStartingElsewhereHasTheSameEnergyAndForces) {
   EXPECT_PETSC(VecRestoreArrayRead(fb, &pb));
 }
 
-using D = Dual<4>;
+using D4 = Dual<4>;
 
-FrameOf<D> moved(const Frame &f, const std::array<D, 4> &q) {
-  const Vector3<D> tangent = f.tangent.cast<D>();
-  const Vector3<D> e = tangent * D(f.length) + Vector3<D>(q[0], q[1], q[2]);
-  const D length = sqrt(e.squaredNorm());
-  const Vector3<D> t = e / length;
-  return {t, rotateAbout<D>(transport<D>(f.director.cast<D>(), tangent, t), t, q[3]), length};
+FrameOf<D4> moved(const Frame &f, const std::array<D4, 4> &q) {
+  const Vector3<D4> tangent = f.tangent.cast<D4>();
+  const Vector3<D4> e = tangent * D4(f.length) + Vector3<D4>(q[0], q[1], q[2]);
+  const D4 length = sqrt(e.squaredNorm());
+  const Vector3<D4> t = e / length;
+  return {t, rotateAbout<D4>(transport<D4>(f.director.cast<D4>(), tangent, t), t, q[3]), length};
 }
 
-FrameOf<D> constant(const Frame &f) { return {f.tangent.cast<D>(), f.director.cast<D>(), D(f.length)}; }
+FrameOf<D4> constant(const Frame &f) { return {f.tangent.cast<D4>(), f.director.cast<D4>(), D4(f.length)}; }
 
 TEST(TwistInertia, DerivativesMatchAutomaticDifferentiation) {
   Random random(14);
   for (int repeat = 0; repeat < 30; ++repeat) {
     const RandomCell c = randomCell(random, 1.0);
     const double weight = 2.5, target = random();
-    std::array<D, 4> q;
-    for (int k = 0; k < 4; ++k) q[k] = D::variable(0, k);
-    const D d = twistIncrement(constant(c.f0), moved(c.f1, q)) - D(target), reference = D(0.5 * weight) * d * d;
+    std::array<D4, 4> q;
+    for (int k = 0; k < 4; ++k) q[k] = D4::variable(0, k);
+    const D4 d = twistIncrement(constant(c.f0), moved(c.f1, q)) - D4(target), reference = D4(0.5 * weight) * d * d;
     const auto exact = twistInertia(c.f0, c.f1, weight, twistIncrement(c.f0, c.f1) - target);
     for (int r = 0, k = 0; r < 4; ++r) {
       EXPECT_NEAR(exact.gradient[r], reference.g[r], 1e-10 * reference.g.norm());
@@ -147,10 +147,10 @@ TEST(Stretch, DerivativesMatchAutomaticDifferentiation) {
     const Energy energy = repeat % 2 ? Energy::classical : Energy::seed;
     const RandomCell c = randomCell(random, 1.0);
     const double inverse = 1 / (1 + 0.3 * random()), stiffness = 3, rest = 0.1 * random();
-    std::array<D, 4> q;
-    for (int k = 0; k < 4; ++k) q[k] = D::variable(0, k);
-    const D strain = axialStrain<D>(energy, moved(c.f1, q).length, D(inverse)) - D(rest),
-            reference = D(0.5 * stiffness / inverse) * strain * strain;
+    std::array<D4, 4> q;
+    for (int k = 0; k < 4; ++k) q[k] = D4::variable(0, k);
+    const D4 strain = axialStrain<D4>(energy, moved(c.f1, q).length, D4(inverse)) - D4(rest),
+            reference = D4(0.5 * stiffness / inverse) * strain * strain;
     const double force = stiffness * (axialStrain(energy, c.f1.length, inverse) - rest),
                  slope = strainSlope(energy, c.f1.length, inverse);
     const Vec3 g = stretchGradient(c.f1, force, slope);

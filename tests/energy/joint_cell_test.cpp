@@ -8,24 +8,24 @@
 namespace tendril::test {
 namespace {
 
-using D = Dual<7>;
+using D7 = Dual<7>;
 
-Vector3<D> asDual(const Vec3 &v) { return {D(v[0]), D(v[1]), D(v[2])}; }
+Vector3<D7> asDual(const Vec3 &v) { return {D7(v[0]), D7(v[1]), D7(v[2])}; }
 
 /// Turned by the first three variables as a rotation vector, up to second order.
-Vector3<D> turned(const Vec3 &v) {
-  const Vector3<D> spin(D::variable(0, 0), D::variable(0, 1), D::variable(0, 2));
-  const Vector3<D> once = spin.cross(asDual(v)), twice = spin.cross(once);
-  return asDual(v) + once + twice * D(0.5);
+Vector3<D7> turned(const Vec3 &v) {
+  const Vector3<D7> spin(D7::variable(0, 0), D7::variable(0, 1), D7::variable(0, 2));
+  const Vector3<D7> once = spin.cross(asDual(v)), twice = spin.cross(once);
+  return asDual(v) + once + twice * D7(0.5);
 }
 
 /// An edge whose vector changes by the next three variables, and whose twist by the last.
-FrameOf<D> moved(const Frame &f) {
-  Vector3<D> e;
-  for (int a = 0; a < 3; ++a) e[a] = D::variable(f.tangent[a] * f.length, 3 + a);
-  const D length = sqrt(e.squaredNorm());
-  const Vector3<D> t = e / length;
-  return {t, rotateAbout<D>(transport<D>(asDual(f.director), asDual(f.tangent), t), t, D::variable(0, 6)), length};
+FrameOf<D7> moved(const Frame &f) {
+  Vector3<D7> e;
+  for (int a = 0; a < 3; ++a) e[a] = D7::variable(f.tangent[a] * f.length, 3 + a);
+  const D7 length = sqrt(e.squaredNorm());
+  const Vector3<D7> t = e / length;
+  return {t, rotateAbout<D7>(transport<D7>(asDual(f.director), asDual(f.tangent), t), t, D7::variable(0, 6)), length};
 }
 
 template <Measure measure> void expectMatch(RandomCell c, int frame) {
@@ -33,9 +33,9 @@ template <Measure measure> void expectMatch(RandomCell c, int frame) {
   turns.length = 1;
   c.cell.weight[frame] = 0;
   c.cell.free = {frame == 0 ? 0.0 : 1.0, frame == 0 ? 1.0 : 0.0}; // as cells have it; both turn all the same
-  const FrameOf<D> joint{turned(turns.tangent), turned(turns.director), D(1.0)}, edge = moved(frame == 0 ? c.f1 : c.f0);
-  const D exact = frame == 0 ? cellEnergy<measure>(joint, edge, cast<D>(c.cell))
-                             : cellEnergy<measure>(edge, joint, cast<D>(c.cell));
+  const FrameOf<D7> joint{turned(turns.tangent), turned(turns.director), D7(1.0)}, edge = moved(frame == 0 ? c.f1 : c.f0);
+  const D7 exact = frame == 0 ? cellEnergy<measure>(joint, edge, cast<D7>(c.cell))
+                             : cellEnergy<measure>(edge, joint, cast<D7>(c.cell));
   const JointCellDerivatives d = jointCellDerivatives<measure>(c.f0, c.f1, c.cell, frame);
   Eigen::Matrix<double, 7, 1> gradient;
   gradient << d.spin, d.edge;

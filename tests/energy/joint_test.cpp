@@ -8,18 +8,18 @@
 namespace tendril::test {
 namespace {
 
-using D = Dual<12>;
+using D12 = Dual<12>;
 
-Vector3<D> asDual(const Vec3 &v) { return {D(v[0]), D(v[1]), D(v[2])}; }
+Vector3<D12> asDual(const Vec3 &v) { return {D12(v[0]), D12(v[1]), D12(v[2])}; }
 
 /// Turned by three variables as a rotation vector, up to second order.
-Vector3<D> turned(const Vec3 &v, int first) {
-  const Vector3<D> spin(D::variable(0, first), D::variable(0, first + 1), D::variable(0, first + 2));
-  const Vector3<D> once = spin.cross(asDual(v)), twice = spin.cross(once);
-  return asDual(v) + once + twice * D(0.5);
+Vector3<D12> turned(const Vec3 &v, int first) {
+  const Vector3<D12> spin(D12::variable(0, first), D12::variable(0, first + 1), D12::variable(0, first + 2));
+  const Vector3<D12> once = spin.cross(asDual(v)), twice = spin.cross(once);
+  return asDual(v) + once + twice * D12(0.5);
 }
-Vector3<D> moved(const Vec3 &v, int first) {
-  return {D::variable(v[0], first), D::variable(v[1], first + 1), D::variable(v[2], first + 2)};
+Vector3<D12> moved(const Vec3 &v, int first) {
+  return {D12::variable(v[0], first), D12::variable(v[1], first + 1), D12::variable(v[2], first + 2)};
 }
 
 Mat3 randomRotation(Random &random) {
@@ -38,18 +38,18 @@ TEST(JointRows, DerivativesMatchAutomaticDifferentiation) {
     p.parent_axes = randomRotation(random);
     p.spun = Vec3::Zero();
     p.before = 4 * pi; // two whole turns
-    std::array<Vector3<D>, 3> s, t;
+    std::array<Vector3<D12>, 3> s, t;
     for (int k = 0; k < 3; ++k) {
       s[std::size_t(k)] = turned(p.parent_axes.col(k), 9);
       t[std::size_t(k)] = turned(p.axes.col(k), 3);
     }
-    const Vector3<D> gap = (moved(child_at, 0) + turned(p.arm, 3)) - (moved(parent_at, 6) + turned(p.parent_arm, 9));
+    const Vector3<D12> gap = (moved(child_at, 0) + turned(p.arm, 3)) - (moved(parent_at, 6) + turned(p.parent_arm, 9));
     for (const Joint::Type type : {Joint::Type::hinge, Joint::Type::prismatic, Joint::Type::ball}) {
       Joint joint{};
       joint.type = type;
       joint.upper = 1;
       for (int k = 0; k < joint_rows; ++k) {
-        D exact;
+        D12 exact;
         double turns = 0;
         if (k < 3)
           exact = type == Joint::Type::prismatic ? s[std::size_t(k)].dot(gap) : gap[k];
@@ -60,15 +60,15 @@ TEST(JointRows, DerivativesMatchAutomaticDifferentiation) {
         else if (k == cosine_row) {
           if (type == Joint::Type::ball) continue;
           exact = s[2].dot(t[2]);
-          if (type == Joint::Type::prismatic) exact = (s[0].dot(t[0]) + s[1].dot(t[1]) + exact - D(1.0)) * D(0.5);
+          if (type == Joint::Type::prismatic) exact = (s[0].dot(t[0]) + s[1].dot(t[1]) + exact - D12(1.0)) * D12(0.5);
         } else if (type == Joint::Type::prismatic)
           exact = s[2].dot(gap);
         else if (type == Joint::Type::hinge) {
           exact = atan2(s[1].dot(t[0]), s[0].dot(t[0]));
           turns = 4 * pi;
         } else { // the angle of the rotation: of a half angle q, sin q = |skew|/2 and cos q = (trace - 1)/2
-          const D cosine_of = (s[0].dot(t[0]) + s[1].dot(t[1]) + s[2].dot(t[2]) - D(1.0)) * D(0.5);
-          exact = atan2(sqrt(D(1.0) - cosine_of * cosine_of), cosine_of);
+          const D12 cosine_of = (s[0].dot(t[0]) + s[1].dot(t[1]) + s[2].dot(t[2]) - D12(1.0)) * D12(0.5);
+          exact = atan2(sqrt(D12(1.0) - cosine_of * cosine_of), cosine_of);
         }
         const JointRow row = jointRow(joint, p, k);
         const double size = 1 + exact.h.norm();

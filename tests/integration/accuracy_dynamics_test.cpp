@@ -12,7 +12,7 @@ SceneFile sceneFile(const std::string &name) {
   return readScene(std::string(TENDRIL_SOURCE_DIR) + "/data/scenes/" + name + ".yaml");
 }
 
-LoopSettings settingsOf(const std::string &integrator, double dt, double t_end) {
+LoopSettings methodAt(const std::string &integrator, double dt, double t_end) {
   LoopSettings s = dynamics(dt, t_end);
   s.integrator.name = integrator;
   return s;
@@ -77,7 +77,7 @@ TEST(AccuracyInDynamics, IsMetOnTheReleasedCantilever) {
     std::vector<Choice> choices;
     for (const double tolerance : {1e-2, 1e-3}) {
       Choice &choice = choices.emplace_back();
-      EXPECT_PETSC(chooseEdgesAndSteps(file.scene, file.drawings, settingsOf(integrator, 0.005, 1),
+      EXPECT_PETSC(chooseEdgesAndSteps(file.scene, file.drawings, methodAt(integrator, 0.005, 1),
                                        {tolerance, Quantity::tip}, &choice));
       const double error =
           rmsOfLast(positionsAt(times, remesh(file.scene, file.drawings, choice.edges), choice.loop), exact);
@@ -99,8 +99,8 @@ TEST(AccuracyInDynamics, IsMetOnTheReleasedCantilever) {
 TEST(AccuracyInDynamics, OfAFirstOrderMethodSpendsMoreOnSteps) {
   const SceneFile file = sceneFile("verify/released");
   Choice euler, second;
-  EXPECT_PETSC(chooseEdgesAndSteps(file.scene, file.drawings, settingsOf("euler", 0.01, 1), {1e-2}, &euler));
-  EXPECT_PETSC(chooseEdgesAndSteps(file.scene, file.drawings, settingsOf("bdf2", 0.01, 1), {1e-2}, &second));
+  EXPECT_PETSC(chooseEdgesAndSteps(file.scene, file.drawings, methodAt("euler", 0.01, 1), {1e-2}, &euler));
+  EXPECT_PETSC(chooseEdgesAndSteps(file.scene, file.drawings, methodAt("bdf2", 0.01, 1), {1e-2}, &second));
   EXPECT_LT(euler.loop.dt, second.loop.dt / 3);
   EXPECT_GT(euler.step_error[0],
             1.2 * euler.edge_error[0]); // sqrt 2 or 2 times, as the two errors have to do with each other
@@ -109,11 +109,11 @@ TEST(AccuracyInDynamics, OfAFirstOrderMethodSpendsMoreOnSteps) {
 TEST(AccuracyInDynamics, IsMetOnASpring) {
   const SceneFile file = sceneFile("helix");
   const std::vector<double> times = timesTo(1, 20);
-  const LoopSettings fine = settingsOf("bdf2", 2e-3, 1);
+  const LoopSettings fine = methodAt("bdf2", 2e-3, 1);
   const std::vector<std::vector<Vec3>> reference =
       positionsAt(times, remesh(file.scene, file.drawings, {512}), fine); // off by about a tenth of the tolerance
   for (const bool adapts : {false, true}) {
-    LoopSettings settings = settingsOf("bdf2", 0.02, 1);
+    LoopSettings settings = methodAt("bdf2", 0.02, 1);
     settings.adapt = adapts ? Adaptation::error : Adaptation::none;
     Choice choice;
     EXPECT_PETSC(chooseEdgesAndSteps(file.scene, file.drawings, settings, {1e-3, Quantity::tip}, &choice));
@@ -137,7 +137,7 @@ TEST(AccuracyInDynamics, IsChosenRodByRod) {
   file.scene.supports[1].rod = 1;
   Choice choice;
   EXPECT_PETSC(
-      chooseEdgesAndSteps(file.scene, file.drawings, settingsOf("generalized_alpha", 0.005, 0.5), {3e-3}, &choice));
+      chooseEdgesAndSteps(file.scene, file.drawings, methodAt("generalized_alpha", 0.005, 0.5), {3e-3}, &choice));
   EXPECT_LT(choice.edges[1], choice.edges[0] / 2);
 }
 
@@ -146,7 +146,7 @@ TEST(AccuracyInDynamics, OfCopiesIsThatOfOne) {
   const Accuracy accuracy{1e-2};
   Choice one, all;
   EXPECT_PETSC(
-      chooseResolution(file.scene, file.drawings, settingsOf("generalized_alpha", 0.005, 0.5), accuracy, &one));
+      chooseResolution(file.scene, file.drawings, methodAt("generalized_alpha", 0.005, 0.5), accuracy, &one));
   for (int r = 1; r < 3; ++r) {
     file.scene.rods.push_back(file.scene.rods[0]);
     file.drawings.push_back(file.drawings[0]);
@@ -154,7 +154,7 @@ TEST(AccuracyInDynamics, OfCopiesIsThatOfOne) {
     file.scene.supports[r].rod = r;
   }
   EXPECT_PETSC(
-      chooseResolution(file.scene, file.drawings, settingsOf("generalized_alpha", 0.005, 0.5), accuracy, &all));
+      chooseResolution(file.scene, file.drawings, methodAt("generalized_alpha", 0.005, 0.5), accuracy, &all));
   EXPECT_EQ(all.edges, std::vector<int>(3, one.edges[0]));
   EXPECT_EQ(all.error, std::vector<double>(3, one.error[0]));
   EXPECT_EQ(all.loop.dt, one.loop.dt);
@@ -165,7 +165,7 @@ TEST(AccuracyInDynamics, SeesMotionShorterThanTheSteps) {
   for (double &k : file.scene.rods[0].material.flexural_stiffness)
     k *= 1e3; // periods of 0.25 s, amplitudes of 0.02; a damped step of 1 s ends at rest
   Choice choice;
-  EXPECT_PETSC(chooseEdgesAndSteps(file.scene, file.drawings, settingsOf("bdf2", 0.01, 4), {5e-3}, &choice));
+  EXPECT_PETSC(chooseEdgesAndSteps(file.scene, file.drawings, methodAt("bdf2", 0.01, 4), {5e-3}, &choice));
   EXPECT_LT(choice.loop.dt, 0.25 / 20);
 }
 
@@ -174,7 +174,7 @@ TEST(AccuracyInDynamics, ThatDoesNotConvergeIsTold) {
   file.scene.rods[0].material.flexural_stiffness = {1e-5, 1e-5}; // a whip: it folds at its ends
   const std::string message = messageOf([&] {
     Choice choice;
-    (void)chooseEdgesAndSteps(file.scene, file.drawings, settingsOf("generalized_alpha", 0.1, 3), {1e-4}, &choice);
+    (void)chooseEdgesAndSteps(file.scene, file.drawings, methodAt("generalized_alpha", 0.1, 3), {1e-4}, &choice);
   });
   EXPECT_TRUE(says(message, "option -accuracy"));
   EXPECT_TRUE(says(message, "smaller -t_end"));

@@ -9,25 +9,25 @@ namespace tendril::test {
 namespace {
 
 using std::numbers::pi;
-constexpr double rounding = 4e-16; // relative, of a handful of operations
+constexpr double few_operations = 4e-16; // relative, of a handful of operations
 
 TEST(Section, CircleAndEllipseInClosedForm) {
   const double r = 0.003;
   const SectionConstants c = sectionConstants({SectionShape::circle, {r, 0}});
-  EXPECT_NEAR(c.area, pi * r * r, rounding * c.area);
-  EXPECT_NEAR(c.second_moment[0], pi * std::pow(r, 4) / 4, rounding * c.second_moment[0]);
-  EXPECT_NEAR(c.torsion, pi * std::pow(r, 4) / 2, rounding * c.torsion);
-  EXPECT_NEAR(c.torsion, c.polarMoment(), rounding * c.torsion); // a circle does not warp
+  EXPECT_NEAR(c.area, pi * r * r, few_operations * c.area);
+  EXPECT_NEAR(c.second_moment[0], pi * std::pow(r, 4) / 4, few_operations * c.second_moment[0]);
+  EXPECT_NEAR(c.torsion, pi * std::pow(r, 4) / 2, few_operations * c.torsion);
+  EXPECT_NEAR(c.torsion, c.polarMoment(), few_operations * c.torsion); // a circle does not warp
 
   const SectionConstants round = sectionConstants({SectionShape::ellipse, {r, r}});
-  EXPECT_NEAR(round.torsion, c.torsion, rounding * c.torsion);
+  EXPECT_NEAR(round.torsion, c.torsion, few_operations * c.torsion);
   // Semi-axes 2 and 1: I1 = pi a b^3/4 about the first director (the long axis), I2 = pi a^3 b/4, J = pi a^3 b^3/(a^2 +
   // b^2).
   const SectionConstants e = sectionConstants({SectionShape::ellipse, {2, 1}});
-  EXPECT_NEAR(e.area, 2 * pi, rounding * e.area);
-  EXPECT_NEAR(e.second_moment[0], pi / 2, rounding);
-  EXPECT_NEAR(e.second_moment[1], 2 * pi, rounding * 8);
-  EXPECT_NEAR(e.torsion, 8 * pi / 5, rounding * 8);
+  EXPECT_NEAR(e.area, 2 * pi, few_operations * e.area);
+  EXPECT_NEAR(e.second_moment[0], pi / 2, few_operations);
+  EXPECT_NEAR(e.second_moment[1], 2 * pi, few_operations * 8);
+  EXPECT_NEAR(e.torsion, 8 * pi / 5, few_operations * 8);
 }
 
 TEST(Section, RectangleTorsionMatchesTables) {
@@ -37,8 +37,8 @@ TEST(Section, RectangleTorsionMatchesTables) {
   const SectionConstants strip = sectionConstants({SectionShape::rectangle, {1.1, 0.32}});
   EXPECT_NEAR(strip.torsion, 0.00981214338578546, 1e-8 * strip.torsion);
   EXPECT_EQ(strip.torsion, sectionConstants({SectionShape::rectangle, {0.32, 1.1}}).torsion);
-  EXPECT_NEAR(strip.second_moment[0], 1.1 * std::pow(0.32, 3) / 12, rounding);
-  EXPECT_NEAR(strip.second_moment[1], 0.32 * std::pow(1.1, 3) / 12, rounding);
+  EXPECT_NEAR(strip.second_moment[0], 1.1 * std::pow(0.32, 3) / 12, few_operations);
+  EXPECT_NEAR(strip.second_moment[1], 0.32 * std::pow(1.1, 3) / 12, few_operations);
 }
 
 TEST(Section, ThinStripHasAThirdOfWidthTimesThicknessCubed) {

@@ -8,7 +8,7 @@
 namespace tendril::test {
 namespace {
 
-constexpr double rounding = 1e-13; // of a product of some hundred rotations
+constexpr double of_rotations = 1e-13; // of a product of some hundred rotations
 
 /// A coil wound on a torus, of uneven edges: its transported frame does not come back to itself.
 Rod bentRing(int edges) {
@@ -31,11 +31,11 @@ TEST(BishopFrames, OfAnOpenRodDoNotTwist) {
   rod.position = helixShape({Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY(), 1, 0.2, 3, 0.1, 60}).points;
   const Vec3 start = Vec3(0.1, 0.7, -0.4);
   setBishopDirectors(rod, start);
-  EXPECT_LT((rod.director[0] - orthonormalised(start, rod.edge(0).normalized())).norm(), rounding);
+  EXPECT_LT((rod.director[0] - orthonormalised(start, rod.edge(0).normalized())).norm(), of_rotations);
   for (int i = 0; i < rod.edges(); ++i) {
-    EXPECT_NEAR(rod.director[i].norm(), 1, rounding);
-    EXPECT_NEAR(rod.director[i].dot(rod.edge(i).normalized()), 0, rounding);
-    if (i > 0) EXPECT_NEAR(angleOver(rod, i - 1, i), 0, rounding);
+    EXPECT_NEAR(rod.director[i].norm(), 1, of_rotations);
+    EXPECT_NEAR(rod.director[i].dot(rod.edge(i).normalized()), 0, of_rotations);
+    if (i > 0) EXPECT_NEAR(angleOver(rod, i - 1, i), 0, of_rotations);
   }
 }
 
@@ -53,7 +53,7 @@ TEST(BishopFrames, OfARingShareItsHolonomyByArcLength) {
   }
   const double total = std::accumulate(twist.begin(), twist.end(), 0.0);
   EXPECT_GT(std::abs(total), 0.1); // there is something to spread
-  for (int i = 0; i < n; ++i) EXPECT_NEAR(twist[i], total * between[i] / length, rounding) << i;
+  for (int i = 0; i < n; ++i) EXPECT_NEAR(twist[i], total * between[i] / length, of_rotations) << i;
   // Frames transported once round and turned by the whole holonomy meet the first frame.
   Frame f = referenceFrame(rod, 0);
   for (int i = 1; i <= n; ++i) {
@@ -61,7 +61,7 @@ TEST(BishopFrames, OfARingShareItsHolonomyByArcLength) {
     f.director = transport<double>(f.director, f.tangent, t);
     f.tangent = t;
   }
-  EXPECT_LT((rotateAbout<double>(f.director, f.tangent, total) - rod.director[0]).norm(), rounding);
+  EXPECT_LT((rotateAbout<double>(f.director, f.tangent, total) - rod.director[0]).norm(), of_rotations);
 }
 
 TEST(BishopFrames, OfAPlaneRingHaveNoTwist) {
@@ -70,7 +70,7 @@ TEST(BishopFrames, OfAPlaneRingHaveNoTwist) {
   rod.position = p.points;
   rod.closed = true;
   setBishopDirectors(rod);
-  for (int i = 0; i < rod.edges(); ++i) EXPECT_NEAR(angleOver(rod, i, rod.next(i)), 0, rounding);
+  for (int i = 0; i < rod.edges(); ++i) EXPECT_NEAR(angleOver(rod, i, rod.next(i)), 0, of_rotations);
 }
 
 TEST(FrameAtVertex, ExtrapolatesACircleToItsEndTangentAtSecondOrder) {
@@ -97,12 +97,12 @@ TEST(Motion, IsLinearBetweenTheRowsOfItsTableAndRestsOutside) {
   EXPECT_EQ(m.displacementAt(2), Vec3(1, 0, 0));
   EXPECT_EQ(m.displacementAt(3), Vec3(1, 1, 0));
   EXPECT_EQ(m.displacementAt(9), Vec3(1, 2, 0));
-  EXPECT_LT((m.rotationAt(1.5) - Eigen::AngleAxisd(0.5, Vec3::UnitZ()).toRotationMatrix()).norm(), rounding);
+  EXPECT_LT((m.rotationAt(1.5) - Eigen::AngleAxisd(0.5, Vec3::UnitZ()).toRotationMatrix()).norm(), of_rotations);
   Motion steady;
   steady.velocity = Vec3(0, 2, 0);
   steady.angular_velocity = Vec3(3, 0, 0);
   EXPECT_EQ(steady.displacementAt(0.5), Vec3(0, 1, 0));
-  EXPECT_LT((steady.rotationAt(2) - Eigen::AngleAxisd(6, Vec3::UnitX()).toRotationMatrix()).norm(), rounding);
+  EXPECT_LT((steady.rotationAt(2) - Eigen::AngleAxisd(6, Vec3::UnitX()).toRotationMatrix()).norm(), of_rotations);
 }
 
 TEST(CheckRod, NamesWhatCannotBeComputed) {
@@ -129,7 +129,7 @@ TEST(DimensionlessGroups, FollowTheirDefinitions) {
   Rod rod = straightRod(10, Measure::tan, 2);
   rod.material.linear_density = 3;
   const DimensionlessGroups g = dimensionlessGroups(rod, Vec3(0, 0, -10));
-  EXPECT_NEAR(g.length, 2, rounding);
+  EXPECT_NEAR(g.length, 2, of_rotations);
   EXPECT_NEAR(g.gravito_bending, 3 * 10 * 8 / 1.0, 1e-12 * 240); // rho g L^3/EI
   EXPECT_NEAR(g.axial_to_bending, 4e10, 1e-12 * 4e10);           // EA L^2/EI
   EXPECT_EQ(g.largest_turning, 0);

@@ -7,7 +7,7 @@
 namespace tendril {
 
 /// What is kept of a run.
-struct Samples {
+struct RunSamples {
   std::string failure;                     ///< why the run tells nothing; empty when it does
   std::vector<int> edges;                  ///< per rod
   std::vector<std::vector<Vec3>> position; ///< at each time (nv) [m]
@@ -18,14 +18,14 @@ struct Samples {
   /// Edges x steps.
   double work() const;
   /// At the first time only.
-  Samples first() const {
+  RunSamples first() const {
     return {failure, edges, {position.front()}, {elastic.front()}, rounding_error, steps, seconds};
   }
 };
 
 /// Runs a scene in dynamics to its end. Steps have to end at the times; where a rejected step put them off, that is a
 /// failure. \param times increasing [s]
-PetscErrorCode sample(Scene scene, const LoopSettings &settings, const std::vector<double> &times, Samples *samples);
+PetscErrorCode sample(Scene scene, const LoopSettings &settings, const std::vector<double> &times, RunSamples *samples);
 
 /// Errors of a rod at places along it, each at the times of the samples.
 using Errors = std::vector<std::vector<Vec3>>;
@@ -33,7 +33,7 @@ using Errors = std::vector<std::vector<Vec3>>;
 /// One run less another, per rod, as a Quantity counts: of positions over the rod's length, at the vertices that a rod
 /// of `edges` has, or its last one; of the elastic energy of all rods, over its largest value (one place, first
 /// component). \param scene with these rods, of any edges \param edges per rod; both runs have as many or multiples
-std::vector<Errors> difference(const Scene &scene, const Samples &run, const Samples &other,
+std::vector<Errors> difference(const Scene &scene, const RunSamples &run, const RunSamples &other,
                                const std::vector<int> &edges, Quantity of);
 
 /// The largest root mean square in time of any place.

@@ -9,6 +9,12 @@ namespace tendril {
 /// Whether friction acts at the surface of a rod, whose frames it turns; cables have none.
 bool carriesSurface(const Rod &rod);
 
+/// Stiffness of the barrier of a rod [N/m]: ten times its weight per length, or where it has more to bear as much as
+/// keeps surfaces within the barrier; a power of four. \param force to bear [N] \param pressure on the sample that is
+/// pressed most [N/m]
+double barrierStiffness(const Scene &scene, const Elements &elements, double force, double pressure, bool is_static,
+                        int rod);
+
 /// A sample in contact, in the axes of the world.
 struct ContactPoint {
   double at;      ///< part of its edge
@@ -44,6 +50,14 @@ struct Touch {
   double gap = HUGE_VAL; ///< between surfaces [m]
   double arc = 0;        ///< along the rod at rest [m]
 };
+/// Where two rods, or a rod and itself, come nearest to each other.
+struct Meeting {
+  int rod, to_rod;
+  double gap;         ///< between surfaces [m]
+  double arc, to_arc; ///< along the rods at rest [m]
+};
+/// Edges of rods that are drawn closer than their law lets them come, the deepest first.
+std::vector<Meeting> overlapsOfRods(const Scene &scene, const Elements &elements, const Configuration &c);
 /// The least gap of each body and obstacle near it; `rod` is the body's number.
 std::vector<Touch> tightestOfBodies(const Scene &scene, const Elements &elements, const Configuration &c);
 /// That of each rod and obstacle near it, the least gap first.

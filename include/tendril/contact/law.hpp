@@ -18,36 +18,37 @@ struct GapLaw {
 class NormalLaw {
 public:
   /// \param stiffness of a barrier, force per length [N/m]
-  NormalLaw(const ContactSettings &settings, double stiffness) : settings_(&settings), stiffness_(stiffness) {}
+  NormalLaw(const ContactSettings &settings, double stiffness)
+      : is_barrier_(settings.isBarrier()), width_(settings.distance), threshold_(settings.threshold),
+        smoothing_(settings.smoothing), stiffness_(is_barrier_ ? stiffness : settings.stiffness) {}
 
   double stiffness() const { return stiffness_; }
   /// Where it begins to act [m].
-  double reach() const { return settings_->isBarrier() ? 0.5 * settings_->distance : settings_->threshold; }
+  double reach() const { return is_barrier_ ? 0.5 * width_ : threshold_; }
 
   GapLaw operator()(double distance) const {
     if (!(distance < reach())) return {};
-    return settings_->isBarrier() ? barrier(distance) : penalty(distance);
+    return is_barrier_ ? barrier(distance) : penalty(distance);
   }
 
 private:
-  const ContactSettings *settings_;
-  double stiffness_;
+  bool is_barrier_;
+  double width_, threshold_, smoothing_, stiffness_;
 
   /// Barrier of Li et al. 2020 (Incremental potential contact, eq. 6) scaled as in Li et al. 2023 (Convergent IPC):
   /// with t the part of `distance` between wall and reach, -stiffness distance (t - 1)^2 ln t.
   GapLaw barrier(double between) const {
-    const double width = settings_->distance, t = between / width + 0.5;
+    const double t = between / width_ + 0.5;
     if (!(t > 0)) return {std::numeric_limits<double>::infinity(), 0, 0};
     const double less = t - 1, log = std::log(t);
-    return {-stiffness_ * width * less * less * log, -stiffness_ * (2 * less * log + less * less / t),
-            -stiffness_ / width * (2 * log + 4 * less / t - less * less / (t * t))};
+    return {-stiffness_ * width_ * less * less * log, -stiffness_ * (2 * less * log + less * less / t),
+            -stiffness_ / width_ * (2 * log + 4 * less / t - less * less / (t * t))};
   }
 
   /// stiffness/2 h^2 of a ramp h with two continuous derivatives, which is linear from 2 x smoothing behind the
   /// threshold.
   GapLaw penalty(double between) const {
-    const double e = settings_->smoothing, depth = settings_->threshold - between, u = depth / e,
-                 k = settings_->stiffness;
+    const double e = smoothing_, depth = threshold_ - between, u = depth / e, k = stiffness_;
     double h = depth - e, slope = 1, bend = 0;
     if (u < 2) { // 3/16 + s/2 + 3/8 s^2 - s^4/16 with s = u - 1
       h = e * u * u * u * (4 - u) / 16;

@@ -122,6 +122,19 @@ public:
   }
   /// Takes what it took from before for constant anew from the iterate. \return by which part that changes its forces
   virtual double renew(const Configuration & /*iterate*/, int /*rod*/) { return 0; }
+  /// Edges that may touch in a step, whose vertices go about so far from its start; sorted by the rod that has them.
+  /// \param room how much farther vertices may go than they are expected to, 1 where nothing else is known
+  virtual std::vector<EdgePair> findTouching(const State & /*state*/, const Configuration & /*start*/,
+                                             const Planes & /*way*/, const Step & /*step*/, double /*room*/) {
+    return {};
+  }
+  /// How often a trial of any of some rods has been kept from leaving the room in which all edges that may touch are
+  /// known.
+  virtual int timesBounded(RodSet /*rods*/) const { return 0; }
+  /// Adds derivatives of what acts between the rods of an island, to both of the gradients; those of each rod alone are
+  /// there, and copies have been added to what they stand for.
+  virtual void addBetween(const Configuration & /*configuration*/, RodSet /*island*/, Derivatives & /*out*/,
+                          HessianKind /*hessian*/) const {}
   /// What a state remembers of it beside the configuration, after the step.
   virtual void commit(State & /*state*/, const Configuration & /*configuration*/, int /*rod*/) const {}
   /// How far rounding blurs the energy, beyond that of its value and of strains [J]. \param blur of an edge over its

@@ -9,6 +9,9 @@ namespace tendril {
 // clang-format off
 /// How rods touch obstacles: in a block of the scene, and in one of each rod.
 #define TENDRIL_CONTACT_KEYS(block)                                                                                    \
+  {block ".rods", KeyType::word, "", "none",                                                                           \
+   "which other rods it touches, of those that touch it: none, others, or all, itself, too", anything,                 \
+   "none|others|all", "all"},                                                                                          \
   {block ".law", KeyType::word, "", "barrier", "barrier: never gives way; penalty: a spring over the depth", anything, \
    "barrier|penalty", "penalty"},                                                                                      \
   {block ".radius", KeyType::number, "m", "(of the section)",                                                          \
@@ -154,7 +157,7 @@ inline constexpr Key scene_keys[] = {
      not_negative, "", "0.1"},
     {"rods[].material.stiffness_damping_coefficient", KeyType::number, "s", "0",
      "dissipation proportional to stiffness", not_negative, "", "1e-3"},
-    {"rods[].contact", KeyType::word_or_map, "", "(as the scene)", "how it touches obstacles; none: not at all",
+    {"rods[].contact", KeyType::word_or_map, "", "(as the scene)", "how it touches obstacles and rods; none: not at all",
      anything, "none", "none"},
     TENDRIL_CONTACT_KEYS("rods[].contact"),
     {"supports", KeyType::list, "", "(none)", "what holds rods"},
@@ -299,7 +302,7 @@ inline constexpr Key scene_keys[] = {
      "[1, 0, 0]"},
     {"colliders[].motion.table", KeyType::rows, "s, m, rad", "(velocities)", "rows as those of supports", anything, "",
      "[[0, 0, 0, 0], [1, 0.1, 0, 0]]"},
-    {"contact", KeyType::map, "", "(defaults)", "how all rods touch obstacles; each rod may have keys of its own"},
+    {"contact", KeyType::map, "", "(defaults)", "how all rods touch obstacles and each other; each rod may have keys of its own"},
     TENDRIL_CONTACT_KEYS("contact"),
     {"contact.ignore", KeyType::list, "", "(none)", "rods that pass through colliders as if they were not there"},
     {"contact.ignore[].rods", KeyType::text, "", "required", "name or layer of the rods, or all", anything, "",

@@ -35,13 +35,13 @@ public:
   /// Unknown of a slot's x, y, z (a = 0, 1, 2) or twist (3), or -1 where it is held or does not exist.
   PetscInt unknown(int slot, int a) const { return unknown_[std::size_t(slot_size) * slot + a]; }
   bool isHeld(int vertex) const { return held_[vertex]; }
-  /// Rods that junctions and ties join, with all between them in the order of the scene; a rod that nothing joins is
-  /// one by itself.
+  /// Rods that junctions, ties and contact join, with all between them in the order of the scene; a rod that nothing
+  /// joins is one by itself.
   RodSet islandOf(int rod) const { return islands_.empty() ? RodSet{rod, rod + 1} : islands_[rod]; }
   /// Whether a junction or a tie meets any of some rods.
   bool isJoined(RodSet rods) const {
-    return !islands_.empty() && std::find(joined_.begin() + rods.begin, joined_.begin() + rods.end, char(true)) !=
-                                    joined_.begin() + rods.end;
+    return !joined_.empty() && std::find(joined_.begin() + rods.begin, joined_.begin() + rods.end, char(true)) !=
+                                   joined_.begin() + rods.end;
   }
   /// Those of some rods, by rod.
   std::span<const JoinedVertex> joinedVertices(RodSet rods) const { return joined_vertices_.of(rods); }
@@ -49,9 +49,16 @@ public:
   std::span<const Tie> ties(RodSet rods) const { return ties_.of(rods); }
   std::span<const JoinedBody> bodies(RodSet rods) const { return bodies_.of(rods); }
   std::span<const BodyPair> pairs(RodSet rods) const { return pairs_.of(rods); }
+  /// Edges that may touch in the step, by the rod that has them.
+  std::span<const EdgePair> touching(RodSet rods) const { return touching_.of(rods); }
+  const ByRod<EdgePair> &touching() const { return touching_; }
+  /// Sets them, in the order of their rods, and makes islands of the rods that they belong to.
+  void setTouching(std::vector<EdgePair> pairs);
+  /// Whether a junction, a tie or contact meets any of some rods.
+  bool isCoupled(RodSet rods) const { return isJoined(rods) || !touching(rods).empty(); }
   Joins joins(int rod) const {
     const RodSet one{rod, rod + 1};
-    return {joinedEdges(one), ties(one), bodies(one), pairs(one)};
+    return {joinedEdges(one), ties(one), bodies(one), pairs(one), touching(one)};
   }
   /// Calls visit(slot) for the slots beside rods that have unknowns, copies or sums of their own: frames of junctions,
   /// bodies, ends of ties, parents of joints.
@@ -83,7 +90,11 @@ public:
   /// Entries of the matrix of some rods in its own order: where their values are in the blocks, those to be taken off
   /// as their complement.
   struct Pattern {
+    std::vector<PetscInt> row, column;
     std::vector<std::ptrdiff_t> source;
+    std::size_t lasting = 0;   ///< of these, all but those of edges that touch
+    std::vector<int> touching; ///< pairs of edges that it has entries of, in order, ...
+    bool turns = false;        ///< ... with their twists, which friction turns
     std::vector<double> entries;
     /// Components of arms that an entry is multiplied by, three times the number of the arm and the axis, or -1; empty
     /// where there are no bodies.
@@ -91,7 +102,8 @@ public:
   };
   /// For slots of some rods that are copies in junctions, those that have the unknowns.
   std::unordered_map<int, int> firstSlots(RodSet rods) const;
-  /// Matrix of PETSc's own type over the unknowns of some rods, preallocated for their blocks.
+  /// Matrix of PETSc's own type over the unknowns of some rods, preallocated for their blocks and those of the pairs of
+  /// edges that touch which the pattern names. \param pattern empty, or that of the same rods with other pairs
   /// \param joins as EdgeBlocks::joins
   PetscErrorCode createMatrix(RodSet rods, bool joins, Mat *matrix, Pattern *pattern) const;
   /// Puts their blocks into it, both triangles.
@@ -136,7 +148,9 @@ private:
   ByRod<BodyPair> pairs_;
   std::vector<Vec3> arms_; ///< of joined vertices
   int groups_ = 0;
+  ByRod<EdgePair> touching_;
   std::vector<RodSet> islands_;  ///< per rod; empty where nothing joins any
+  std::vector<RodSet> lasting_;  ///< the same without contact
   std::vector<char> joined_;     ///< per rod, as islands
   std::vector<int> unknown_end_; ///< slot behind the last with unknowns, per rod
   OwnedDM dm_;

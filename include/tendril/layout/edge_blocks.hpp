@@ -22,7 +22,8 @@ inline constexpr int joined_entries = slot_entries + 3 * edge_size;
 /// what the last edge has with the first; the other copies are added to what they stand for (fold). Of an edge that is
 /// joined to a frame, the frame's spin is the position at its slot, and what it has with the edge is `across` at the
 /// slot of the half cell, spin by edge. What a tie has is `vertex` at the slot of its copy;
-/// what a pair of bodies has stands at its own slots in rows.
+/// what a pair of bodies has stands at its own slots in rows. Two edges that touch have a block of their own for what
+/// is between them.
 class EdgeBlocks {
 public:
   /// Planes of a slot's entries. Edge variables r, c in 0..3: e_x, e_y, e_z, twist.
@@ -48,6 +49,17 @@ public:
   /// \param joins whether positions have entries with edges
   explicit EdgeBlocks(int slots, bool joins = false)
       : entries_(joins ? joined_entries : slot_entries), data_(std::size_t(entries_) * slots + 4 * lanes, 0.0) {}
+  /// Makes room for so many pairs of edges that touch.
+  void setTouching(std::size_t pairs) { touching_.assign(touching_size * pairs, 0.0); }
+  /// Entries of a pair, row by row: the variables of the edge by those of the other (EdgePair::place).
+  double *touching(int number) { return touching_.data() + std::size_t(touching_size) * number; }
+  const double *touching(int number) const { return touching_.data() + std::size_t(touching_size) * number; }
+  /// An entry by its place: in data(), or behind touching_place that of a pair.
+  double at(std::ptrdiff_t place) const {
+    return place < touching_place ? data_[std::size_t(place)] : touching_[std::size_t(place - touching_place)];
+  }
+  static constexpr int touching_size = EdgePair::variables * EdgePair::variables;
+  static constexpr std::ptrdiff_t touching_place = std::ptrdiff_t(1) << 48;
   bool joins() const { return entries_ == joined_entries; }
   int entries() const { return entries_; }
   /// Moves the window to the rods from this slot on (see Planes).
@@ -76,6 +88,7 @@ public:
 private:
   int origin_ = 0, entries_ = slot_entries;
   AlignedVector data_;
+  std::vector<double> touching_;
 };
 
 /// The planes of one rod's entries by slot of the scene, for element loops.

@@ -138,12 +138,27 @@ struct Tie {
   bool isToBody() const { return vertex < 0; }
 };
 
-/// What junctions and ties add to the matrix of some rods.
+/// Edges of two rods, or of one, that may touch each other in a step; `rod` is the later one of both.
+struct EdgePair {
+  int rod, edge, to_rod, to_edge;
+  std::array<int, 4> slot; ///< of the vertices of the edge, then of the other
+  int number = -1;         ///< over all pairs: of the block that they have between them (EdgeBlocks::touching)
+  /// Of each edge x, y, z of its first vertex, those of its second, and its twist.
+  static constexpr int variables = 7;
+  /// Where a variable stands: its slot and the component there. \param side 0 the edge, 1 the other
+  std::pair<int, int> place(int side, int variable) const {
+    if (variable == 6) return {slot[std::size_t(2 * side)], 3};
+    return {slot[std::size_t(2 * side + variable / 3)], variable % 3};
+  }
+};
+
+/// What junctions, ties and contact add to the matrix of some rods.
 struct Joins {
   std::span<const JoinedEdge> edges;
   std::span<const Tie> ties;
   std::span<const JoinedBody> bodies;
   std::span<const BodyPair> pairs;
+  std::span<const EdgePair> touching;
 };
 
 /// Unknowns of a slot: x, y, z, twist.

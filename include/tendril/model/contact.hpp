@@ -17,6 +17,9 @@ struct ContactSettings {
   /// which gives way.
   enum class Law { barrier, penalty };
   bool on = true;
+  /// Which rods it touches, of those that say the same of it.
+  enum class Rods { none, others, all };
+  Rods rods = Rods::none;
   Law law = Law::barrier;
   double radius = 0;   ///< of the rod [m]
   double distance = 0; ///< width of the barrier [m]
@@ -42,6 +45,7 @@ struct ContactSettings {
     settings.on = false;
     return settings;
   }
+  bool touchesRods() const { return on && rods != Rods::none; }
   bool isBarrier() const { return law == Law::barrier; }
   /// Distance from the surface of a shape that no motion passes [m]: of a penalty, short of where the axis of the rod,
   /// or without a radius the middle of the obstacle, would be passed.

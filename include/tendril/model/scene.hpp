@@ -177,7 +177,16 @@ struct Scene {
   /// The latest time up to another, later one until which all obstacles move evenly (Motion::evenUntil).
   double collidersEvenUntil(double from, double to) const;
   bool touchesBody(int body) const { return !colliders.empty() && bodies[body].contact.on; }
-  /// Whether a rod may touch anything.
+  /// Whether any rod touches others or itself.
+  bool touchesRods() const {
+    return std::any_of(rods.begin(), rods.end(), [](const Rod &r) { return r.contact.touchesRods(); });
+  }
+  /// Whether friction or damping acts between any.
+  bool slidesAmongRods() const {
+    return std::any_of(rods.begin(), rods.end(),
+                       [](const Rod &r) { return r.contact.touchesRods() && r.contact.slides(); });
+  }
+  /// Whether a rod may touch obstacles.
   bool touches(int rod) const { return !colliders.empty() && rods[rod].contact.on; }
   /// Whether friction or damping acts on any.
   bool slides() const;

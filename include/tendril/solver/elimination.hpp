@@ -55,12 +55,10 @@ private:
       apart(act);
   }
   template <class Do> [[gnu::noinline]] static void apart(const Do &act) { act(); }
-
   void corner(T (&far)[state_size][state_size]) const {
     for (int r = 0; r < state_size; ++r)
       for (int c = 0; c < state_size; ++c) far[r][c] = corner_[std::min(r, c)][std::max(r, c)];
   }
-
   void toFirstEdge() {
     if (border == Border::none && !held_[last_]) addVertex(last_, state_);
     for (int i = n_ - 1; i > begin_; --i) {

@@ -41,6 +41,16 @@ public:
   /// state with supports' frames (not yet their positions) moved to the end of the step.
   void beginStep(const State &start, const Step &step);
   void beginRod(const State &start, int rod);
+  /// Whether rods touch each other or themselves. Then findTouching has to find what may touch in a step after it has
+  /// begun with all of its rods, which makes islands of them.
+  bool touchesRods() const { return touches_rods_; }
+  void findTouching(const State &start, double room);
+  /// See Term::timesBounded.
+  int timesBounded(RodSet rods) const {
+    int times = 0;
+    for (const auto &term : terms_) times += term->timesBounded(rods);
+    return times;
+  }
   /// See SupportMotion.
   const std::string &beyondBarrier() const { return supports_.beyondBarrier(); }
   /// Changes the load factor (in statics also the time) of the step under way; the iterate stays.
@@ -262,7 +272,7 @@ private:
   Known &known(int rod) { return known_[dofs_.islandOf(rod).begin]; }
   std::vector<RodScale> scales_;
 
-  bool dynamic_, couples_positions_, joins_positions_;
+  bool dynamic_, couples_positions_, joins_positions_, touches_rods_;
   bool obstacles_move_;
   std::vector<char> obstacles_held_; ///< per rod
 

@@ -31,6 +31,7 @@ struct NewtonReport {
   /// (root mean square), of the worst rod.
   double rounding_error = 0;
   bool lost = false;           ///< in rounding: the failure of the step
+  bool bounded = false;        ///< rods left the room in which contact between them is known: the failure of the step
   std::vector<double> history; ///< force residual, relative to the load scale, at every iterate
   std::string reason;          ///< in words
   /// Whether Newton may have come to an unstable equilibrium, or passed it and only met indefinite Hessians.
@@ -112,6 +113,9 @@ class NewtonSolver {
 public:
   /// Creates SNES and its parts and reads -snes_*, -ksp_*, -pc_*, -mat_* options.
   PetscErrorCode setUp(IncrementalPotential &potential, NewtonWork &work, RodSet rods);
+  /// Takes note of what may touch in the step.
+  void takeTouching();
+  bool touches() const { return touches_; }
   /// Minimises the potential of the step, which has begun. The potential's iterate is the answer when `report` says
   /// converged. \param guess where to begin instead of at the start state \param patience iterations after which it
   /// fails; 0: as many as -snes_max_it
@@ -149,6 +153,8 @@ private:
   OwnedMat jacobian_;
   DofMap::Pattern pattern_; ///< of a matrix of PETSc's own
   bool banded_ = true;
+  bool touches_ = false;     ///< whether edges may touch in the step, ...
+  bool fresh_pairs_ = false; ///< ... and they are not yet those that the matrix knows
   OwnedMat band_;    ///< where the solver that was chosen has no inertia of each rod: the same matrix once more, ...
   OwnedKSP inertia_; ///< ... factored by `banded`, which tells what is a minimum, and how far an iterate is from it
   OwnedVec x_, f_, right_, solution_;
@@ -188,6 +194,7 @@ private:
   KSP factored() const;
   PetscErrorCode readInertia(bool *regular);
   PetscErrorCode solveAgain(Vec f, Vec y);
+  PetscErrorCode makeMatrix();
   PetscErrorCode refill();
   PetscErrorCode refactor();
   PetscErrorCode makeDescent(Vec f, Vec y, bool regular);

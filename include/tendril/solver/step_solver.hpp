@@ -39,7 +39,7 @@ public:
   /// Called with each block that has converged, while it is in the cache.
   std::function<void(RodSet)> on_block;
   /// Starts a step without solving it.
-  void begin(const State &start, const Step &step);
+  PetscErrorCode begin(const State &start, const Step &step);
   /// Sets the linear solvers up as a step would, so that their options have been asked for before the first step.
   PetscErrorCode rehearse(const State &start, const Step &step);
   /// Factors the Hessian at the iterate and counts negative pivots; -1 when it cannot be factored.
@@ -60,12 +60,16 @@ public:
 private:
   IncrementalPotential *potential_ = nullptr;
   Share share_;
+  Coupling coupling_ = Coupling::none;
   std::optional<NewtonWork> work_;
   std::deque<NewtonSolver> blocks_;
 
+  PetscErrorCode solveBlocks(const State &start, const Step &step, NewtonReport *report, Seek seek, const Guess *guess);
   void agree(double failed, NewtonReport *report) const;
   PetscErrorCode solveBlock(NewtonSolver &block, const State &start, NewtonReport *report);
   PetscErrorCode setUpBlocks(const std::vector<RodSet> &blocks);
+  std::vector<RodSet> wantedBlocks() const;
+  PetscErrorCode findTouching(const State &start, double room);
 };
 
 } // namespace tendril

@@ -75,6 +75,8 @@ struct State {
   std::vector<Vec3> support_actions;
   /// Stiffness of the barrier between each rod and obstacles in the last step; where there are obstacles [N/m].
   std::vector<double> contact_stiffness;
+  /// The same of the barrier between each rod and others; where rods touch each other.
+  std::vector<double> rod_contact_stiffness;
   /// What samples of each rod that touched an obstacle at the end of the last step remember, in order; where friction
   /// acts on any rod.
   std::vector<std::vector<ContactMemory>> contacts;

@@ -1,0 +1,62 @@
+#pragma once
+/// \file neighbours.hpp
+/// Which edges of rods may touch each other.
+
+#include "tendril/contact/law.hpp"
+#include "tendril/layout/elements.hpp"
+
+#include <map>
+
+namespace tendril {
+
+/// Where each vertex of the scene may be: no farther from a place than so much [m].
+struct Room {
+  std::vector<Vec3> middle;
+  std::vector<double> radius;
+};
+
+class Neighbours {
+public:
+  Neighbours(const Scene &scene, const Elements &elements);
+
+  /// Pairs of edges that may come within the reach of their law while vertices keep to their room, in the order of
+  /// the rods and edges of the later one. Found by a grid: the cost goes with the edges and with what is near.
+  std::vector<EdgePair> find(const Room &room) const;
+  /// The same by looking at all of them, for tests.
+  std::vector<EdgePair> findByAll(const Room &room) const;
+  /// Whether two edges touch at all: neighbours along a rod do not, or rods would push themselves straight. Those are
+  /// apart by less than half a turn of the rod around its own surface, along it and through what joins two rods.
+  bool mayTouch(int rod, int edge, int to_rod, int to_edge) const;
+  /// Of the first vertex of an edge, along its rod at rest [m].
+  double arc(int rod, int edge) const {
+    return arc_[std::size_t(elements_.rods[std::size_t(rod)].first_vertex + edge)];
+  }
+
+private:
+  /// What joins two rods: where along each, and how far apart that is.
+  struct Joint {
+    double arc, to_arc, apart;
+  };
+  const Scene &scene_;
+  const Elements &elements_;
+  std::vector<double> arc_;   ///< per vertex
+  std::vector<double> width_; ///< per rod, of their barriers, or what a penalty reaches [m]
+  std::map<std::pair<int, int>, std::vector<Joint>> joints_; ///< by rods, the smaller number first
+
+  double lengthOf(int rod, int edge) const;
+  double alongRod(int rod, int edge, int to_edge) const;
+  double toArc(int rod, int edge, double arc) const;
+  bool isNear(const Room &room, int rod, int edge, int to_rod, int to_edge) const;
+  EdgePair pairOf(int rod, int edge, int to_rod, int to_edge) const;
+  void addJoint(int rod, int vertex, int to_rod, int to_vertex);
+};
+
+/// The law of two rods: barriers as wide as both in the mean and as stiff as the stiffer one; penalties of the
+/// geometric mean of their stiffnesses.
+NormalLaw lawBetween(const ContactSettings &a, double stiffness_a, const ContactSettings &b, double stiffness_b);
+/// Whether two edges touch, or might after a motion by the width of their law.
+bool nearlyTouch(const Scene &scene, const EdgePair &pair, const std::array<Vec3, 4> &vertices);
+/// Distance between the axes of two rods that no motion passes [m]: that of the barrier, or a fifth of their radii.
+double wallBetween(const ContactSettings &a, const ContactSettings &b);
+
+} // namespace tendril

@@ -1,0 +1,147 @@
+#pragma once
+/// \file touching_rods.hpp
+/// Edges of rods that touch in a step: where their samples are near, and how far they may move.
+
+#include "tendril/contact/neighbours.hpp"
+#include "tendril/contact/segments.hpp"
+#include "tendril/energy/term.hpp"
+
+#include <algorithm>
+
+namespace tendril {
+
+/// A sample of one edge within the reach of the other; or, to be taken off again, of the vertex behind the other, which
+/// that edge and the next both count.
+struct Touching {
+  int side, sample; ///< whether of the pair's edge (0) or of its other (1), and which
+  bool taken_off;
+  double weight; ///< its part of the rod at rest, halved, for it counts from both sides [m]; negative if taken off
+  double gap;    ///< between surfaces [m]
+  double distance;
+  Vec3 normal;                ///< from the other edge to the sample
+  std::array<double, 4> part; ///< of the motions of the four vertices in that of the sample from the other edge
+  bool inside;                ///< whether it is nearest between the other's vertices
+  int other() const { return 2 - 2 * side; } ///< where the vertices of the other edge begin
+};
+
+class TouchingRods {
+public:
+  TouchingRods(const Scene &scene, const Elements &elements);
+
+  /// Finds what may touch in a step whose vertices go about so far, and how stiff barriers are in it.
+  void find(const State &state, const Configuration &start, const Planes &way, const Step &step, double room);
+  /// Finds what touches anew where a rod is not where it has been looked for.
+  void cover(const Configuration &c, int rod) const;
+  const ByRod<EdgePair> &pairs() const { return pairs_; }
+  /// Those of a rod, which it has or another one.
+  const std::vector<int> &pairsOf(int rod) const { return of_rod_[std::size_t(rod)]; }
+
+  const ContactSettings &settings(int rod) const { return scene_.rods[std::size_t(rod)].contact; }
+  const std::vector<double> &stiffness() const { return stiffness_; } ///< of barriers, per rod [N/m]
+  NormalLaw lawOf(const EdgePair &p) const { return lawOf(stiffness_, p); }
+  NormalLaw lawOf(const std::vector<double> &stiffness, const EdgePair &p) const {
+    return lawBetween(settings(p.rod), stiffness[std::size_t(p.rod)], settings(p.to_rod),
+                      stiffness[std::size_t(p.to_rod)]);
+  }
+  /// The four vertices of a pair from the first [m].
+  static std::array<Vec3, 4> pointsOf(const EdgePair &p, const Configuration &c) {
+    std::array<Vec3, 4> x;
+    for (std::size_t k = 0; k < 4; ++k) x[k] = c.displacements<double>(p.slot[k], c, p.slot[0]);
+    return x;
+  }
+  /// Calls visit(sample) for those of a pair within reach, one edge after the other.
+  template <class Visit> void visit(const EdgePair &p, const std::array<Vec3, 4> &x, double reach, Visit visit) const;
+  /// Calls visit(pair, sample) for all that touch of those pairs that some rods have.
+  template <class Visit> void visit(const Configuration &c, RodSet rods, Visit visit) const {
+    for (const EdgePair &p : pairs_.of(rods))
+      this->visit(p, pointsOf(p, c), lawOf(p).reach(), [&](const Touching &t) { visit(p, t); });
+  }
+
+  double smallestGap(const Configuration &c, int rod) const;
+  /// Part of the straight way on which no pair that a rod has passes its wall, and its vertices stay where all that
+  /// they may touch is known.
+  double freeFraction(const Configuration &from, const Configuration &to, int rod) const;
+  int timesBounded(int rod) const { return bounded_[std::size_t(rod)]; }
+
+private:
+  const Scene &scene_;
+  const Elements &elements_;
+  const Neighbours neighbours_;
+  std::vector<double> stiffness_;
+  mutable std::vector<int> bounded_; ///< per rod
+  mutable Room room_;
+  mutable ByRod<EdgePair> pairs_;
+  mutable std::vector<std::array<char, 2>> goes_on_; ///< per pair and side: whether the edge behind the other touches
+  mutable std::vector<std::vector<int>> of_rod_;
+
+  double radiiOf(const EdgePair &p) const { return settings(p.rod).radius + settings(p.to_rod).radius; }
+  double widthOf(const EdgePair &p) const {
+    return settings(p.rod).isBarrier() ? 0.5 * (settings(p.rod).distance + settings(p.to_rod).distance)
+                                       : 0.2 * radiiOf(p);
+  }
+  double wallOf(const EdgePair &p) const;
+  void makeRoom(const Configuration &start, const Planes *way, double room) const;
+  void take(std::vector<EdgePair> pairs) const;
+  void setStiffness(const State &state, const Configuration &start, const Planes &way, const Step &step);
+  /// No more than the distance of both edges.
+  static double farApart(const std::array<Vec3, 4> &x) {
+    return 0.5 * ((x[0] + x[1] - x[2] - x[3]).norm() - (x[1] - x[0]).norm() - (x[3] - x[2]).norm());
+  }
+};
+
+/// Samples are at both ends of an edge and between, a fraction of the thinner radius apart, so that where they lie does
+/// not matter (docs/theory.md). Those that are farther off than others between could come nearer are passed over.
+template <class Visit>
+void TouchingRods::visit(const EdgePair &p, const std::array<Vec3, 4> &x, double reach, Visit visit) const {
+  const double radii = radiiOf(p);
+  if (farApart(x) > radii + reach) return;
+  const double thinner = std::min(settings(p.rod).radius, settings(p.to_rod).radius),
+               fine = std::sqrt(std::min(1.0, widthOf(p) / (0.2 * thinner)));
+  for (const int side : {0, 1}) {
+    const std::size_t own = std::size_t(2 * side), other = 2 - own;
+    const int rod = side == 0 ? p.rod : p.to_rod, edge = side == 0 ? p.edge : p.to_edge;
+    const double rest = elements_.restLength()[elements_.rods[std::size_t(rod)].slot(edge)];
+    constexpr double most = 1000;
+    const int count = int(std::clamp(std::ceil(rest / (0.5 * thinner * fine)), 1.0, most));
+    const Vec3 along = x[own + 1] - x[own];
+    const double spacing = along.norm() / count;
+    for (int k = 0; k <= count;) {
+      const double at = double(k) / count;
+      const Vec3 place = x[own] + at * along;
+      const Projection near = project(place, x[other], x[other + 1]);
+      Touching t;
+      t.gap = near.distance - radii;
+      if (!(t.gap < reach)) {
+        k += 1 + int(std::min(most, 0.999 * (t.gap - reach) / spacing));
+        continue;
+      }
+      t.side = side;
+      t.sample = k;
+      t.taken_off = false;
+      t.weight = (k == 0 || k == count ? 0.25 : 0.5) * rest / count;
+      t.distance = near.distance;
+      t.normal = near.from / near.distance;
+      t.part[own] = 1 - at;
+      t.part[own + 1] = at;
+      t.part[other] = near.part - 1;
+      t.part[other + 1] = -near.part;
+      t.inside = near.inside();
+      visit(t);
+      ++k;
+      if (!goes_on_[std::size_t(p.number)][std::size_t(side)]) continue;
+      const Vec3 from = place - x[other + 1];
+      t.taken_off = true;
+      t.distance = from.norm();
+      t.gap = t.distance - radii;
+      if (!(t.gap < reach)) continue;
+      t.weight = -t.weight;
+      t.normal = from / t.distance;
+      t.part[other] = 0;
+      t.part[other + 1] = -1;
+      t.inside = false;
+      visit(t);
+    }
+  }
+}
+
+} // namespace tendril

@@ -1,0 +1,221 @@
+#include "tendril/contact/neighbours.hpp"
+
+#include "tendril/contact/segments.hpp"
+
+#include <algorithm>
+#include <cstdint>
+
+namespace tendril {
+
+NormalLaw lawBetween(const ContactSettings &a, double stiffness_a, const ContactSettings &b, double stiffness_b) {
+  ContactSettings both = a;
+  both.distance = 0.5 * (a.distance + b.distance);
+  both.threshold = 0.5 * (a.threshold + b.threshold);
+  both.smoothing = 0.5 * (a.smoothing + b.smoothing);
+  both.stiffness = std::sqrt(a.stiffness * b.stiffness);
+  return {both, std::max(stiffness_a, stiffness_b)};
+}
+
+double wallBetween(const ContactSettings &a, const ContactSettings &b) {
+  const double radii = a.radius + b.radius;
+  return a.isBarrier() ? radii - 0.25 * (a.distance + b.distance) : 0.2 * radii;
+}
+
+bool nearlyTouch(const Scene &scene, const EdgePair &p, const std::array<Vec3, 4> &x) {
+  const ContactSettings &a = scene.rods[std::size_t(p.rod)].contact, &b = scene.rods[std::size_t(p.to_rod)].contact;
+  const double reach = lawBetween(a, 1, b, 1).reach();
+  return closest(x[0], x[1], x[2], x[3]).distance < a.radius + b.radius + 3 * reach;
+}
+
+Neighbours::Neighbours(const Scene &scene, const Elements &elements) : scene_(scene), elements_(elements) {
+  for (std::size_t r = 0; r < scene.rods.size(); ++r) {
+    const RodRange &rod = elements.rods[r];
+    double arc = 0;
+    for (int i = 0; i < rod.vertices; ++i) {
+      arc_.push_back(arc);
+      if (i < rod.edges) arc += elements.restLength()[rod.slot(i)];
+    }
+    const ContactSettings &c = scene.rods[r].contact;
+    width_.push_back(c.isBarrier() ? c.distance : 2 * c.threshold);
+  }
+  for (const Junction &j : scene.junctions)
+    for (std::size_t a = 0; a < j.members.size(); ++a)
+      for (std::size_t b = 0; b < a; ++b)
+        addJoint(j.members[a].rod, j.members[a].vertex, j.members[b].rod, j.members[b].vertex);
+  for (const Constraint &c : scene.constraints)
+    if (c.isTie()) addJoint(c.rod, c.at, c.to_rod, c.to_vertex);
+  for (std::size_t a = 0; a < scene.attachments.size(); ++a)
+    for (std::size_t b = 0; b < a; ++b)
+      if (const Attachment &one = scene.attachments[a], &other = scene.attachments[b]; one.body == other.body)
+        addJoint(one.rod, one.vertex, other.rod, other.vertex);
+}
+
+void Neighbours::addJoint(int rod, int vertex, int to_rod, int to_vertex) {
+  if (rod == to_rod) return;
+  if (rod > to_rod) {
+    std::swap(rod, to_rod);
+    std::swap(vertex, to_vertex);
+  }
+  const double apart = (scene_.rods[std::size_t(rod)].position[std::size_t(vertex)] -
+                        scene_.rods[std::size_t(to_rod)].position[std::size_t(to_vertex)])
+                           .norm();
+  joints_[{rod, to_rod}].push_back({arc(rod, vertex), arc(to_rod, to_vertex), apart});
+}
+
+double Neighbours::lengthOf(int rod, int edge) const {
+  return elements_.restLength()[elements_.rods[std::size_t(rod)].slot(edge)];
+}
+
+/// Rest length between two edges of a rod, the shorter way round a ring [m].
+double Neighbours::alongRod(int rod, int edge, int to_edge) const {
+  if (edge > to_edge) std::swap(edge, to_edge);
+  if (edge == to_edge) return 0;
+  const double between = arc(rod, to_edge) - arc(rod, edge) - lengthOf(rod, edge);
+  if (!elements_.rods[std::size_t(rod)].closed) return between;
+  return std::min(between, elements_.length(rod) - (arc(rod, to_edge) + lengthOf(rod, to_edge) - arc(rod, edge)));
+}
+
+/// Rest length from an edge to a place along its rod, the shorter way round a ring [m].
+double Neighbours::toArc(int rod, int edge, double place) const {
+  const double begin = arc(rod, edge), end = begin + lengthOf(rod, edge), all = elements_.length(rod);
+  auto from = [&](double x) { return std::max({begin - x, x - end, 0.0}); };
+  return elements_.rods[std::size_t(rod)].closed ? std::min({from(place), from(place - all), from(place + all)})
+                                                 : from(place);
+}
+
+bool Neighbours::mayTouch(int rod, int edge, int to_rod, int to_edge) const {
+  const ContactSettings &a = scene_.rods[std::size_t(rod)].contact, &b = scene_.rods[std::size_t(to_rod)].contact;
+  if (!a.touchesRods() || !b.touchesRods()) return false;
+  const double radii = a.radius + b.radius,
+               least =
+                   std::max(0.5 * pi * radii, radii + 0.5 * (width_[std::size_t(rod)] + width_[std::size_t(to_rod)]));
+  if (rod == to_rod) return a.rods == ContactSettings::Rods::all && alongRod(rod, edge, to_edge) > least;
+  if (rod > to_rod) {
+    std::swap(rod, to_rod);
+    std::swap(edge, to_edge);
+  }
+  const auto found = joints_.find({rod, to_rod});
+  return found == joints_.end() || std::none_of(found->second.begin(), found->second.end(), [&](const Joint &j) {
+           return toArc(rod, edge, j.arc) + toArc(to_rod, to_edge, j.to_arc) + j.apart <= least;
+         });
+}
+
+bool Neighbours::isNear(const Room &room, int rod, int edge, int to_rod, int to_edge) const {
+  std::array<Vec3, 4> x;
+  double away = scene_.rods[std::size_t(rod)].contact.radius + scene_.rods[std::size_t(to_rod)].contact.radius +
+                0.25 * (width_[std::size_t(rod)] + width_[std::size_t(to_rod)]);
+  for (const int side : {0, 1}) {
+    const RodRange &range = elements_.rods[std::size_t(side == 0 ? rod : to_rod)];
+    const int e = side == 0 ? edge : to_edge;
+    double most = 0;
+    for (const int end : {0, 1}) {
+      const std::size_t v = std::size_t(range.first_vertex + (e + end) % range.vertices);
+      x[std::size_t(2 * side + end)] = room.middle[v];
+      most = std::max(most, room.radius[v]);
+    }
+    away += most;
+  }
+  return closest(x[0], x[1], x[2], x[3]).distance < away;
+}
+
+EdgePair Neighbours::pairOf(int rod, int edge, int to_rod, int to_edge) const {
+  if (std::pair(rod, edge) < std::pair(to_rod, to_edge)) {
+    std::swap(rod, to_rod);
+    std::swap(edge, to_edge);
+  }
+  const RodRange &a = elements_.rods[std::size_t(rod)], &b = elements_.rods[std::size_t(to_rod)];
+  return {rod,
+          edge,
+          to_rod,
+          to_edge,
+          {a.slot(edge), a.slot((edge + 1) % a.vertices), b.slot(to_edge), b.slot((to_edge + 1) % b.vertices)}};
+}
+
+namespace {
+
+/// An edge in one cell of the grid.
+struct InCell {
+  std::uint64_t cell;
+  int edge; ///< place in the list of boxes
+  bool operator<(const InCell &other) const { return std::pair(cell, edge) < std::pair(other.cell, other.edge); }
+};
+
+struct Box {
+  int rod, edge;
+  Vec3 low, high;
+};
+
+bool isBefore(const EdgePair &a, const EdgePair &b) {
+  return std::tuple(a.rod, a.edge, a.to_rod, a.to_edge) < std::tuple(b.rod, b.edge, b.to_rod, b.to_edge);
+}
+
+} // namespace
+
+std::vector<EdgePair> Neighbours::find(const Room &room) const {
+  constexpr int bits = 21, most_cells = 1 << (bits - 1); // along an axis
+  std::vector<Box> boxes;
+  std::vector<double> sizes;
+  Vec3 origin = Vec3::Constant(HUGE_VAL), far = -origin;
+  for (int r = 0; r < int(elements_.rods.size()); ++r) {
+    const RodRange &rod = elements_.rods[std::size_t(r)];
+    const ContactSettings &c = scene_.rods[std::size_t(r)].contact;
+    if (!c.touchesRods()) continue;
+    for (int i = 0; i < rod.edges; ++i) {
+      const std::size_t a = std::size_t(rod.first_vertex + i),
+                        b = std::size_t(rod.first_vertex + (i + 1) % rod.vertices);
+      const double about = c.radius + 0.25 * width_[std::size_t(r)] + std::max(room.radius[a], room.radius[b]);
+      const Vec3 low = room.middle[a].cwiseMin(room.middle[b]).array() - about,
+                 high = room.middle[a].cwiseMax(room.middle[b]).array() + about;
+      boxes.push_back({r, i, low, high});
+      sizes.push_back((high - low).maxCoeff());
+      origin = origin.cwiseMin(low);
+      far = far.cwiseMax(high);
+    }
+  }
+  if (boxes.empty()) return {};
+  std::nth_element(sizes.begin(), sizes.begin() + std::ptrdiff_t(sizes.size() / 2), sizes.end());
+  const double cell = std::max(sizes[sizes.size() / 2], (far - origin).maxCoeff() / most_cells);
+  auto cellAt = [&](const Vec3 &x) {
+    std::array<std::uint64_t, 3> at;
+    for (int a = 0; a < 3; ++a) at[std::size_t(a)] = std::uint64_t((x[a] - origin[a]) / cell);
+    return at;
+  };
+  auto keyOf = [](std::uint64_t x, std::uint64_t y, std::uint64_t z) { return (x << 2 * bits) | (y << bits) | z; };
+  std::vector<InCell> cells;
+  for (std::size_t k = 0; k < boxes.size(); ++k) {
+    const auto low = cellAt(boxes[k].low), high = cellAt(boxes[k].high);
+    for (std::uint64_t x = low[0]; x <= high[0]; ++x)
+      for (std::uint64_t y = low[1]; y <= high[1]; ++y)
+        for (std::uint64_t z = low[2]; z <= high[2]; ++z) cells.push_back({keyOf(x, y, z), int(k)});
+  }
+  std::sort(cells.begin(), cells.end());
+  std::vector<EdgePair> pairs;
+  for (std::size_t begin = 0, end; begin < cells.size(); begin = end) {
+    end = begin + 1;
+    while (end < cells.size() && cells[end].cell == cells[begin].cell) ++end;
+    for (std::size_t i = begin; i < end; ++i)
+      for (std::size_t j = begin; j < i; ++j) {
+        const Box &a = boxes[std::size_t(cells[i].edge)], &b = boxes[std::size_t(cells[j].edge)];
+        if ((a.low.array() > b.high.array()).any() || (b.low.array() > a.high.array()).any()) continue;
+        const auto first = cellAt(a.low.cwiseMax(b.low)); // they meet in other cells, too
+        if (keyOf(first[0], first[1], first[2]) != cells[begin].cell) continue;
+        if (mayTouch(a.rod, a.edge, b.rod, b.edge) && isNear(room, a.rod, a.edge, b.rod, b.edge))
+          pairs.push_back(pairOf(a.rod, a.edge, b.rod, b.edge));
+      }
+  }
+  std::sort(pairs.begin(), pairs.end(), isBefore);
+  return pairs;
+}
+
+std::vector<EdgePair> Neighbours::findByAll(const Room &room) const {
+  std::vector<EdgePair> pairs;
+  const int rods = int(elements_.rods.size());
+  for (int r = 0; r < rods; ++r)
+    for (int i = 0; i < elements_.rods[std::size_t(r)].edges; ++i)
+      for (int q = 0; q <= r; ++q)
+        for (int j = 0; j < (q == r ? i : elements_.rods[std::size_t(q)].edges); ++j)
+          if (mayTouch(r, i, q, j) && isNear(room, r, i, q, j)) pairs.push_back(pairOf(r, i, q, j));
+  return pairs;
+}
+
+} // namespace tendril

@@ -1,0 +1,164 @@
+#include "tendril/contact/touching_rods.hpp"
+
+#include "tendril/contact/contact.hpp"
+#include "tendril/energy/load.hpp"
+
+namespace tendril {
+
+TouchingRods::TouchingRods(const Scene &scene, const Elements &elements)
+    : scene_(scene), elements_(elements), neighbours_(scene, elements), stiffness_(scene.rods.size(), 0),
+      bounded_(scene.rods.size(), 0) {
+  for (std::size_t r = 0; r < scene.rods.size(); ++r) stiffness_[r] = scene.rods[r].contact.stiffness;
+}
+
+void TouchingRods::find(const State &state, const Configuration &start, const Planes &way, const Step &step,
+                        double room) {
+  makeRoom(start, &way, room);
+  take(neighbours_.find(room_));
+  std::fill(bounded_.begin(), bounded_.end(), 0);
+  setStiffness(state, start, way, step);
+}
+
+void TouchingRods::cover(const Configuration &c, int r) const {
+  const RodRange &rod = elements_.rods[std::size_t(r)];
+  bool covered = !room_.middle.empty();
+  for (int i = 0; i < rod.vertices && covered; ++i) {
+    const std::size_t v = std::size_t(rod.first_vertex + i);
+    covered = (c.positionAt(rod.slot(i)) - room_.middle[v]).norm() <= room_.radius[v];
+  }
+  if (covered) return;
+  makeRoom(c, nullptr, 1);
+  take(neighbours_.find(room_));
+}
+
+/// Between samples edges come a little nearer to each other than samples do, whose energy is what holds them apart: no
+/// way is ended before that does.
+double TouchingRods::wallOf(const EdgePair &p) const {
+  const double wall = wallBetween(settings(p.rod), settings(p.to_rod));
+  return settings(p.rod).isBarrier() ? wall - 0.25 * widthOf(p) : wall;
+}
+
+/// Vertices go along their ways, and about as much to all sides.
+void TouchingRods::makeRoom(const Configuration &start, const Planes *way, double room) const {
+  room_.middle.resize(std::size_t(elements_.vertices()));
+  room_.radius.resize(room_.middle.size());
+  for (std::size_t r = 0; r < scene_.rods.size(); ++r) {
+    const RodRange &rod = elements_.rods[r];
+    double most = 0;
+    for (int i = 0; i < rod.vertices && way; ++i) most = std::max(most, way->vector(0, rod.slot(i)).norm());
+    const double beyond = room * std::max(settings(int(r)).radius, std::min(most, elements_.length(int(r))));
+    for (int i = 0; i < rod.vertices; ++i) {
+      const std::size_t v = std::size_t(rod.first_vertex + i);
+      const Vec3 half = way ? Vec3(0.5 * way->vector(0, rod.slot(i))) : Vec3(Vec3::Zero());
+      room_.middle[v] = start.positionAt(rod.slot(i)) + half;
+      room_.radius[v] = half.norm() + beyond;
+    }
+  }
+}
+
+void TouchingRods::take(std::vector<EdgePair> pairs) const {
+  pairs_ = {};
+  pairs_.items = std::move(pairs);
+  pairs_.sort(scene_.rods.size());
+  goes_on_.clear();
+  of_rod_.assign(scene_.rods.size(), {});
+  auto goesOn = [&](int rod, int edge, int to_rod, int to_edge) {
+    const RodRange &range = elements_.rods[std::size_t(to_rod)];
+    if (!range.closed && to_edge + 1 == range.edges) return false;
+    return neighbours_.mayTouch(rod, edge, to_rod, (to_edge + 1) % range.edges);
+  };
+  for (EdgePair &p : pairs_.items) {
+    p.number = int(goes_on_.size());
+    goes_on_.push_back({goesOn(p.rod, p.edge, p.to_rod, p.to_edge), goesOn(p.to_rod, p.to_edge, p.rod, p.edge)});
+    of_rod_[std::size_t(p.rod)].push_back(p.number);
+    if (p.to_rod != p.rod) of_rod_[std::size_t(p.to_rod)].push_back(p.number);
+  }
+}
+
+double TouchingRods::smallestGap(const Configuration &c, int r) const {
+  double least = HUGE_VAL;
+  for (const EdgePair &p : pairs_.of({r, r + 1})) {
+    const std::array<Vec3, 4> x = pointsOf(p, c);
+    const double radii = radiiOf(p), apart = farApart(x) - radii;
+    if (apart < least) least = std::min(least, closest(x[0], x[1], x[2], x[3]).distance - radii);
+  }
+  return least;
+}
+
+double TouchingRods::freeFraction(const Configuration &from, const Configuration &to, int r) const {
+  constexpr double near = 0.2, short_of = 0.99;
+  double free = 1;
+  const RodRange &rod = elements_.rods[std::size_t(r)];
+  for (int i = 0; i < rod.vertices; ++i) {
+    const std::size_t v = std::size_t(rod.first_vertex + i);
+    const Vec3 end = to.positionAt(rod.slot(i));
+    if ((end - room_.middle[v]).norm() <= room_.radius[v]) continue;
+    const Vec3 begin = from.positionAt(rod.slot(i));
+    const double rest = room_.radius[v] - (begin - room_.middle[v]).norm();
+    free = std::min(free, short_of * std::max(rest, 0.0) / (end - begin).norm());
+  }
+  if (free < 1) ++bounded_[std::size_t(r)];
+  for (const EdgePair &p : pairs_.of({r, r + 1})) {
+    const std::array<Vec3, 4> x = pointsOf(p, from);
+    const double wall = wallOf(p);
+    std::array<Vec3, 4> way;
+    double longest = 0;
+    for (std::size_t k = 0; k < 4; ++k) {
+      way[k] = to.displacementAt(p.slot[k], from);
+      longest = std::max(longest, way[k].norm());
+    }
+    if (farApart(x) - 2 * longest > wall + widthOf(p)) continue;
+    const double gap = closest(x[0], x[1], x[2], x[3]).distance - wall;
+    if (gap <= 0) return 0;
+    free = std::min(free, freePart(x, way, wall, near * std::min(gap, widthOf(p))));
+  }
+  return free;
+}
+
+/// Stiffness of barriers by what they have to bear: loads, and what stops rods that meet in the step. One that is
+/// pressed stays as it is, or it would throw rods off.
+void TouchingRods::setStiffness(const State &state, const Configuration &start, const Planes &way, const Step &step) {
+  const std::size_t rods = scene_.rods.size();
+  const std::vector<double> before =
+      state.rod_contact_stiffness.empty() ? std::vector<double>(rods, 0.0) : state.rod_contact_stiffness;
+  std::vector<double> pressure(rods, 0), momentum(rods, 0);
+  std::vector<std::map<int, double>> closing(rods); // of each edge, the fastest [m]
+  for (const EdgePair &p : pairs_.items) {
+    const std::array<Vec3, 4> x = pointsOf(p, start);
+    const NormalLaw law = lawOf(before, p);
+    visit(p, x, law.reach(), [&](const Touching &t) {
+      for (const int r : {p.rod, p.to_rod})
+        pressure[std::size_t(r)] = std::max(pressure[std::size_t(r)], -law(t.gap).slope);
+    });
+    if (step.isStatic()) continue;
+    const Closest near = closest(x[0], x[1], x[2], x[3]);
+    auto at = [&](std::size_t k, double part) {
+      return Vec3((1 - part) * way.vector(0, p.slot[k]) + part * way.vector(0, p.slot[k + 1]));
+    };
+    const double towards = -near.from.normalized().dot(at(0, near.part) - at(2, near.other_part));
+    if (!(towards > near.distance - radiiOf(p) - law.reach())) continue;
+    for (const auto &[r, edge] : {std::pair(p.rod, p.edge), std::pair(p.to_rod, p.to_edge)}) {
+      double &fastest = closing[std::size_t(r)][edge];
+      fastest = std::max(fastest, towards);
+    }
+  }
+  for (std::size_t r = 0; r < rods; ++r) {
+    const ContactSettings &contact = settings(int(r));
+    if (!contact.touchesRods() || !contact.isBarrier() || contact.stiffness > 0) continue;
+    constexpr double bearable = 1e4;
+    if (!step.isStatic() && pressure[r] > 0 && pressure[r] <= bearable * before[r]) {
+      stiffness_[r] = before[r];
+      continue;
+    }
+    double stopping = 0;
+    const RodRange &rod = elements_.rods[r];
+    for (const auto &[edge, fastest] : closing[r])
+      stopping += scene_.rods[r].material.linear_density * elements_.restLength()[rod.slot(edge)] * fastest /
+                  (step.dt * step.dt);
+    stiffness_[r] =
+        barrierStiffness(scene_, elements_, loadScale(scene_, elements_, int(r), elements_.length(int(r))) + stopping,
+                         pressure[r], step.isStatic(), int(r));
+  }
+}
+
+} // namespace tendril
