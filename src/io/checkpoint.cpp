@@ -94,20 +94,19 @@ template <class Archive, class AnyContents> void exchange(Archive &a, AnyContent
     a.array("memory_edge_" + std::to_string(n), s.memory[n].edge, elements.edges());
   }
   a.array("strains", s.strains, strains);
+  auto list = [&](const char *count, const char *name, auto &array) {
+    std::size_t size = array.size();
+    whole(count, size, 1e15);
+    a.array(name, array, size);
+  };
   if (a.format_version < 3) return;
-  std::size_t actions = s.support_actions.size();
-  whole("remembered_actions", actions, 1e15);
-  a.array("support_actions", s.support_actions, actions);
+  list("remembered_actions", "support_actions", s.support_actions);
   if (a.format_version < 4) return;
-  std::size_t stiffness = s.contact_stiffness.size();
-  whole("rods_in_contact", stiffness, 1e15);
-  a.array("contact_stiffness", s.contact_stiffness, stiffness);
+  list("rods_in_contact", "contact_stiffness", s.contact_stiffness);
   if (a.format_version < 5) return;
   exchangeContacts(a, s, whole);
   if (a.format_version < 6) return;
-  std::size_t groups = s.junction_axes.size();
-  whole("junction_groups", groups, 1e15);
-  a.array("junction_axes", s.junction_axes, groups);
+  list("junction_groups", "junction_axes", s.junction_axes);
   if (a.format_version < 7) return;
   std::size_t bodies = s.body_rate.size();
   whole("bodies", bodies, 1e15);
@@ -116,13 +115,9 @@ template <class Archive, class AnyContents> void exchange(Archive &a, AnyContent
   a.array("body_rate", s.body_rate, bodies);
   for (std::size_t n = 0; n < memory; ++n) a.array("memory_body_" + std::to_string(n), s.memory[n].body, bodies);
   if (a.format_version < 8) return;
-  std::size_t joints = s.joints.size();
-  whole("joints", joints, 1e15);
-  a.array("joints", s.joints, joints);
+  list("joints", "joints", s.joints);
   if (a.format_version < 9) return;
-  std::size_t touching = s.rod_contact_stiffness.size();
-  whole("rods_that_touch_rods", touching, 1e15);
-  a.array("rod_contact_stiffness", s.rod_contact_stiffness, touching);
+  list("rods_that_touch_rods", "rod_contact_stiffness", s.rod_contact_stiffness);
 }
 
 /// Whole turns of cells that were others in the checkpoint: the twist of a vertex along the rod stays what it was, by
@@ -339,8 +334,8 @@ void adapt(Found *f, const std::vector<double> &places, const Simulation &run, c
   const bool other_cells = !cells.empty() && cells != places;
   if (cells.empty() && s.winding.size() != places.size()) s.winding.assign(places.size(), 0.0);
   const std::size_t rods = run.elements->rods.size();
-  if (s.contact_stiffness.size() < rods) s.contact_stiffness.clear();
-  if (s.rod_contact_stiffness.size() < rods) s.rod_contact_stiffness.clear();
+  for (auto stiffness : {&State::contact_stiffness, &State::rod_contact_stiffness})
+    if ((s.*stiffness).size() < rods) (s.*stiffness).clear();
   if (s.contacts.size() != rods) s.contacts.clear();
   s.junction_axes.resize(run.elements->groups, {Vec3::UnitX(), Vec3::UnitY()});
   for (Rates &rates : s.memory) rates.body.resize(run.scene.bodies.size());

@@ -122,7 +122,7 @@ std::string rulesOf(std::string_view block) {
     return R"("if": {"required": ["contact"]}, "then": {"anyOf": [{"required": ["colliders"]},
  {"properties": {"contact": {"required": ["rods"], "properties": {"rods": {"enum": ["others", "all"]}}}}},
  {"properties": {"rods": {"contains": {"required": ["contact"],
-  "properties": {"contact": {"type": "object", "required": ["rods"], "properties": {"rods": {"enum": ["others", "all"]}}}}}}}]})";
+  "properties": {"contact": {"type": "object", "required": ["rods"], "properties": {"rods": {"enum": ["others", "all"]}}}}}}}}]})";
   if (block == "rods[]")
     return R"("oneOf": [{"required": ["line"]}, {"required": ["ring"]}, {"required": ["helix"]}, {"required": ["points"]}, {"required": ["file"]}])";
   if (block == "rods[].material")
