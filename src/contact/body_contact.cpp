@@ -9,8 +9,6 @@
 namespace tendril {
 namespace {
 
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
-
 /// A sample that may touch an obstacle. \see Samples
 struct Near {
   int sample, collider;

@@ -10,8 +10,6 @@
 namespace tendril {
 namespace {
 
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
-
 /// Sum of the momenta of the vertices of a rod towards the obstacles that they may meet in the step [kg m/s].
 double momentumTowards(const Scene &scene, const Elements &elements, const RodContacts &contacts, const State &state,
                        double dt, int r) {

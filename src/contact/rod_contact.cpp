@@ -11,8 +11,6 @@
 namespace tendril {
 namespace {
 
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
-
 /// Derivatives over the variables of a pair of edges (EdgePair::place), those of the one first.
 struct OfPair {
   static constexpr int half = EdgePair::variables, size = 2 * half;

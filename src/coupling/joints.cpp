@@ -12,7 +12,6 @@
 namespace tendril {
 namespace {
 
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 /// By how much stiffer than what it holds an exact joint is between two updates of its forces: each takes the error of
 /// these down by as much. In statics it does with less; bodies that are not alike take at most so much of the softer.
 constexpr double stiffer = 1e6, stiffer_in_statics = 1e3, stiffest = 1e9;

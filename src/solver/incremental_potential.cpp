@@ -10,8 +10,6 @@
 namespace tendril {
 using C = Configuration;
 
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
-
 IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, const Elements &elements, bool dynamic)
     : scene_(scene), dofs_(dofs), elements_(elements), retraction_(elements), axial_(scene, elements),
       terms_(makeTerms(scene, elements, axial_, dynamic)), supports_(scene, dofs, elements), start_(elements.slots),

@@ -8,8 +8,6 @@ namespace tendril {
 
 using C = Configuration;
 
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
-
 double edgeError(double reach, double edge) { return epsilon * (1 + epsilon * reach / edge); }
 
 std::vector<RodScale> rodScales(const Scene &scene, const Elements &elements) {

@@ -10,10 +10,8 @@
 #include <sstream>
 
 namespace tendril {
-
 namespace {
 
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr int patience = 3; ///< iterations without a fall of the residual
 
 } // namespace

@@ -8,8 +8,6 @@ namespace tendril {
 
 using C = Configuration;
 
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
-
 SupportMotion::SupportMotion(const Scene &scene, const DofMap &dofs, const Elements &elements)
     : scene_(scene), dofs_(dofs), elements_(elements), moving_(elements.rods.size()), turned_(elements.rods.size()) {
   for (std::size_t s = 0; s < scene.supports.size(); ++s)

@@ -107,6 +107,12 @@ def bodies(text, ties="", more=""):
     return (support, f"{support}\nbodies: [{text}]\nconstraints: [{ties}]{more}")
 
 
+def second(more, text=""):
+    """A second rod across the first, half a radius off, with keys of its own and of the scene."""
+    return ("supports:\n" + support, "  - {name: b, line: {from: [0.3, -0.1, 0.01], to: [0.3, 0.1, 0.01], edges: 4}, "
+            f"material: {{radius: 0.01, young: 1e7, poisson: 0.3, density: 1000}}{more}}}\n{text}supports:\n  - {{rod: a, vertex: 0, type: clamp}}")
+
+
 def joints(text):
     """A free body and one that stays, with joints."""
     wall = "{name: wall, box: {size: [1, 1, 1]}, density: 1, position: [9, 9, 9], fixed: true}"
@@ -201,6 +207,12 @@ rows = [
     ("option of contact below zero", None, ["-contact_stiffness", "-3"], ["-contact_stiffness", "greater than zero"]),
     ("option of contact as a word", None, ["-contact_distance", "wide"], ["-contact_distance", "number"]),
     ("contact without colliders", (support, support + "\ncontact: {friction: 0.1}"), [], ["scene.yaml:9", "'contact' has nothing to act on", "colliders"]),
+    ("contact of rods of no kind", (support, support + "\ncontact: {rods: some}"), [], ["scene.yaml:9", "none", "others", "all"]),
+    ("contact of rods without a radius", ("density: 1000}\n", "density: 1000}\n    contact: {rods: all, law: penalty, radius: 0}\n"), [], ["needs a contact radius above 0"]),
+    ("rods drawn into each other", second("", "contact: {rods: others}\n"), [], ["rod 'b' at arc length 0.1 m lies 0.01 m deep in rod 'a' at 0.3 m", "rods: none"]),
+    ("rods that touch by two laws", second(", contact: {law: penalty}", "contact: {rods: others}\n"), [], ["rods 'a' and 'b' touch each other by two laws"]),
+    ("rods that touch by midpoint", (support, support + "\ncontact: {rods: all}"), ["-integrator", "midpoint"], ["-integrator midpoint", "rods that touch each other", "euler"]),
+    ("rods that touch on a path", (support, support + "\ncontact: {rods: all}"), ["-accuracy", "1e-3"], ["-accuracy", "rods that touch each other"]),
     ("stick of no kind", (support, support + "\ncontact: {stick: glue}\ncolliders: [{plane: {}, position: [0, -1, 0]}]"), [], ["scene.yaml:9", "creep", "anchored"]),
     ("ignored rods that are not there", (support, support + "\ncontact: {ignore: [{rods: hair, colliders: all}]}\ncolliders: [{plane: {}, position: [0, -1, 0]}]"), [], ["scene.yaml:9", "no rod has the name or layer 'hair'"]),
     ("ignored colliders that are not there", (support, support + "\ncontact: {ignore: [{rods: all, colliders: wall}]}\ncolliders: [{plane: {}, position: [0, -1, 0]}]"), [], ["scene.yaml:9", "no collider has the name or layer 'wall'"]),

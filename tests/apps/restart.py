@@ -306,6 +306,19 @@ colliders:
     print("friction goes on to the same bits")
 
 
+def amongRods(tmp):
+    """Strands in a box that lie upon each other with friction."""
+    for integrator in ("euler", "bdf2"):
+        base = ["-scene", source + "/data/scenes/pile.yaml", "-integrator", integrator, "-dt", 2**-8]
+        run(0, *base, "-t_end", 0.0625, "-output_dir", tmp + "/half")
+        with h5py.File(tmp + "/half/checkpoint.h5") as f:
+            assert f["rod_contact_stiffness"][:].max() > 0, integrator
+        run(0, *base, "-t_end", 0.125, "-restart", tmp + "/half/checkpoint.h5", "-output_dir", tmp + "/on")
+        run(0, *base, "-t_end", 0.125, "-output_dir", tmp + "/whole")
+        same(final(tmp + "/on"), final(tmp + "/whole"))
+    print("rods that touch each other go on to the same bits")
+
+
 def joined(tmp):
     """Rods that junctions join, rigidly and by a ball, under a pin that moves, and springs between vertices: frames and
     reactions go on to the same bits."""
@@ -473,7 +486,7 @@ def full(tmp):
     print("full disks are told,", with_frames, "with frames")
 
 
-for test in (letGo, changes, balances, folders, automatic, orders, touching, joined, signals, full):
+for test in (letGo, changes, balances, folders, automatic, orders, touching, amongRods, joined, signals, full):
     if len(sys.argv) > 3 and test.__name__ not in sys.argv[3:]:
         continue
     with tempfile.TemporaryDirectory() as folder:

@@ -328,6 +328,70 @@ TEST(RodContact, FastRodsDoNotPassThroughEachOther) {
     }
 }
 
+/// A rod slides along one that is held and stops after v^2/(2 mu g), less v dt/2 of backward Euler, and v of the
+/// fall-off.
+TEST(RodContact, FrictionStopsWhatSlides) {
+  const double speed = 0.3, coefficient = 0.3, dt = 0.002;
+  for (const bool at_surface : {true, false}) {
+    Scene scene;
+    scene.gravity = Vec3(0, 0, -9.81);
+    scene.rods = {wire("beam", Vec3(-0.15, 0, 0), Vec3(0.15, 0, 0), 20, 0.005, 1e9),
+                  wire("slider", Vec3(-0.1, 0, 0.01), Vec3(0, 0, 0.01), 20)};
+    for (const int v : {0, 20}) scene.supports.push_back(hold(scene, 0, v, Support::Kind::clamp));
+    for (Rod &rod : scene.rods) {
+      rod.contact.friction = coefficient;
+      rod.contact.friction_at_surface = at_surface;
+      rod.contact.fall_off_velocity = 1e-3;
+    }
+    scene.rods[1].initial_velocity = Vec3(speed, 0, 0);
+    Simulation sim;
+    runTo(sim, scene, dynamics(dt, 0.12));
+    const double moved = sim.state.position[21 + 10][0] + 0.05,
+                 expected = speed * speed / (2 * coefficient * 9.81) - 0.5 * speed * dt;
+    EXPECT_NEAR(moved, expected, 0.01 * expected);
+    EXPECT_LT(sim.state.velocity[21 + 10].norm(), 1e-3);
+  }
+}
+
+/// Two crossed rods of which one is drawn along itself over the other, and 1e-5 m off: what friction does to both has
+/// no couple beyond its force times that change of the gap, where friction between centrelines would have twice the
+/// radius.
+TEST(RodContact, FrictionMakesNoCouple) {
+  const double r = 0.01, off = 1e-5;
+  Vec3 force = Vec3::Zero(), couple = Vec3::Zero();
+  for (const double sign : {1.0, -1.0}) { // with friction less that without
+    Scene scene;
+    scene.gravity = Vec3::Zero();
+    scene.rods = {wire("low", Vec3(-0.1, 0, 0), Vec3(0.1, 0, 0), 9, r, 1e8),
+                  wire("high", Vec3(0.003, -0.1, 2 * r), Vec3(0.003, 0.1, 2 * r), 9, r, 1e8)};
+    for (Rod &rod : scene.rods) {
+      rod.contact.friction = sign > 0 ? 0.3 : 0;
+      rod.contact.stiffness = 1e3;
+    }
+    Simulation sim;
+    EXPECT_PETSC(sim.setUp(scene, dynamics(0.01, 1)));
+    const std::unique_ptr<Term> contact = makeRodContact(sim.scene, *sim.elements);
+    const Configuration start = configurationOf(sim.state, sim.scene, *sim.elements, 0);
+    Step step;
+    step.dt = step.time = 0.01;
+    const auto pairs = contact->findTouching(sim.state, start, sim.dofs.makePlanes(), step, 1);
+    for (int v = 10; v < 20; ++v) sim.state.position[std::size_t(v)] += Vec3(0.002, 0.001, off);
+    const Configuration end = configurationOf(sim.state, sim.scene, *sim.elements, 0);
+    Derivatives d(sim.elements->slots, true);
+    d.blocks.setTouching(pairs.size());
+    contact->addBetween(end, {0, 2}, d, HessianKind::none);
+    for (int v = 0; v < 20; ++v) {
+      const int s = sim.elements->vertex_slot[std::size_t(v)];
+      const Vec3 f = d.gradient.vector(0, s);
+      couple += sign * end.positionAt(s).cross(f);
+      if (v < 10) force += sign * f;
+    }
+    for (const int s : sim.elements->edge_slot) couple += sign * d.gradient[3][s] * end.frameAt(s).tangent;
+  }
+  EXPECT_GT(force.norm(), 0.1);
+  EXPECT_LT(couple.norm() / force.norm(), 1.1 * off);
+}
+
 TEST(RodContact, OverlapsAreFound) {
   Scene scene;
   scene.rods = {wire("a", Vec3(-0.1, 0, 0), Vec3(0.1, 0, 0), 10),

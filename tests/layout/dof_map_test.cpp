@@ -7,7 +7,7 @@ namespace tendril::test {
 namespace {
 
 /// A rod with clamps at an end and along it, a cable with pins, and a ring.
-Scene mixedScene() {
+Scene lineAndRing() {
   Scene scene;
   Rod bar = straightRod(12), cable = straightRod(7), ring;
   cable.material.flexural_stiffness = {0, 0};
@@ -23,7 +23,7 @@ Scene mixedScene() {
 }
 
 struct Mapped {
-  Scene scene = mixedScene();
+  Scene scene = lineAndRing();
   DofMap dofs;
   std::unique_ptr<Elements> elements;
   Mapped() {

@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <experimental/simd>
+#include <limits>
 #include <numbers>
 
 #if defined(__x86_64__) && defined(__GLIBC__)
@@ -23,6 +24,8 @@ using Pack = std::experimental::native_simd<double>;
 inline constexpr int lanes = int(Pack::size());
 
 inline constexpr double pi = std::numbers::pi;
+/// Of rounding, relative to one.
+inline constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 template <class T> using Vector3 = Eigen::Matrix<T, 3, 1>;
 template <class T> using Matrix3 = Eigen::Matrix<T, 3, 3>;
