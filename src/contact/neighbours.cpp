@@ -101,21 +101,25 @@ bool Neighbours::mayTouch(int rod, int edge, int to_rod, int to_edge) const {
 }
 
 bool Neighbours::isNear(const Room &room, int rod, int edge, int to_rod, int to_edge) const {
-  std::array<Vec3, 4> x;
+  std::array<Vec3, 4> x, way;
   double away = scene_.rods[std::size_t(rod)].contact.radius + scene_.rods[std::size_t(to_rod)].contact.radius +
                 0.25 * (width_[std::size_t(rod)] + width_[std::size_t(to_rod)]);
+  const bool together = rod == to_rod; // else each is anywhere on its way: about the middle of that
   for (const int side : {0, 1}) {
     const RodRange &range = elements_.rods[std::size_t(side == 0 ? rod : to_rod)];
     const int e = side == 0 ? edge : to_edge;
     double most = 0;
     for (const int end : {0, 1}) {
-      const std::size_t v = std::size_t(range.first_vertex + (e + end) % range.vertices);
-      x[std::size_t(2 * side + end)] = room.middle[v];
-      most = std::max(most, room.radius[v]);
+      const std::size_t v = std::size_t(range.first_vertex + (e + end) % range.vertices),
+                        k = std::size_t(2 * side + end);
+      way[k] = room.way[v];
+      x[k] = room.start[v] + (together ? 0 : 0.5) * way[k];
+      most = std::max(most, room.beyond[v] + (together ? 0 : 0.5 * way[k].norm()));
     }
     away += most;
   }
-  return closest(x[0], x[1], x[2], x[3]).distance < away;
+  if (closest(x[0], x[1], x[2], x[3]).distance < away) return true;
+  return together && freePart(x, way, away, 1e-3 * away) < 1;
 }
 
 EdgePair Neighbours::pairOf(int rod, int edge, int to_rod, int to_edge) const {
@@ -163,9 +167,14 @@ std::vector<EdgePair> Neighbours::find(const Room &room) const {
     for (int i = 0; i < rod.edges; ++i) {
       const std::size_t a = std::size_t(rod.first_vertex + i),
                         b = std::size_t(rod.first_vertex + (i + 1) % rod.vertices);
-      const double about = c.radius + 0.25 * width_[std::size_t(r)] + std::max(room.radius[a], room.radius[b]);
-      const Vec3 low = room.middle[a].cwiseMin(room.middle[b]).array() - about,
-                 high = room.middle[a].cwiseMax(room.middle[b]).array() + about;
+      const double about = c.radius + 0.25 * width_[std::size_t(r)] + std::max(room.beyond[a], room.beyond[b]);
+      Vec3 low = room.start[a], high = low;
+      for (const Vec3 &x : {room.start[b], Vec3(room.start[a] + room.way[a]), Vec3(room.start[b] + room.way[b])}) {
+        low = low.cwiseMin(x);
+        high = high.cwiseMax(x);
+      }
+      low.array() -= about;
+      high.array() += about;
       boxes.push_back({r, i, low, high});
       sizes.push_back((high - low).maxCoeff());
       origin = origin.cwiseMin(low);

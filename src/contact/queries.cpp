@@ -92,9 +92,9 @@ std::vector<Meeting> overlapsOfRods(const Scene &scene, const Elements &elements
   if (!scene.touchesRods()) return found;
   const Neighbours neighbours(scene, elements);
   Room room;
-  for (std::size_t v = 0; v < elements.vertex_slot.size(); ++v)
-    room.middle.push_back(c.positionAt(elements.vertex_slot[v]));
-  room.radius.assign(room.middle.size(), 0);
+  for (const int slot : elements.vertex_slot) room.start.push_back(c.positionAt(slot));
+  room.way.assign(room.start.size(), Vec3::Zero());
+  room.beyond.assign(room.start.size(), 0);
   for (const EdgePair &p : neighbours.find(room)) {
     const ContactSettings &a = scene.rods[std::size_t(p.rod)].contact, &b = scene.rods[std::size_t(p.to_rod)].contact;
     const Closest near =

@@ -51,7 +51,7 @@ public:
       s = {};
       if (time_ > 0) s.points = slidingPairs(start, r);
     }
-    return rods_.pairs().items;
+    return rods_.expected();
   }
   int timesBounded(RodSet rods) const override {
     int most = 0;
@@ -244,6 +244,8 @@ private:
         out.gradient[a][slot] += d.gradient[OfPair::half * side + k];
         out.equilibrium[a][slot] += d.gradient[OfPair::half * side + k];
       }
+    const int number = rods_.expectedNumber(p);
+    if (number < 0) rods_.note(p);
     if (kind == HessianKind::none) return;
     EdgeBlocks &blocks = out.blocks;
     for (const int side : {0, 1}) {
@@ -261,7 +263,8 @@ private:
         for (int b = a; b < edge_size; ++b)
           blocks.entry(rod, EdgeBlocks::own(a, b))[i] += d.hessian(at + 3 + a, at + 3 + b);
     }
-    double *to = blocks.touching(p.number);
+    if (number < 0) return;
+    double *to = blocks.touching(number);
     for (int a = 0; a < OfPair::half; ++a)
       for (int b = 0; b < OfPair::half; ++b) to[OfPair::half * a + b] += d.hessian(a, OfPair::half + b);
   }

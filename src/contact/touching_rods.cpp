@@ -7,25 +7,46 @@ namespace tendril {
 
 TouchingRods::TouchingRods(const Scene &scene, const Elements &elements)
     : scene_(scene), elements_(elements), neighbours_(scene, elements), stiffness_(scene.rods.size(), 0),
-      bounded_(scene.rods.size(), 0) {
+      bounded_(scene.rods.size(), 0), surprised_(scene.rods.size(), false) {
   for (std::size_t r = 0; r < scene.rods.size(); ++r) stiffness_[r] = scene.rods[r].contact.stiffness;
 }
 
 void TouchingRods::find(const State &state, const Configuration &start, const Planes &way, const Step &step,
                         double room) {
+  const bool surprised = room > 1 && std::find(surprised_.begin(), surprised_.end(), true) != surprised_.end();
   makeRoom(start, &way, room);
   take(neighbours_.find(room_));
+  expect(start, way, surprised);
   std::fill(bounded_.begin(), bounded_.end(), 0);
+  std::fill(surprised_.begin(), surprised_.end(), false);
   setStiffness(state, start, way, step);
 }
 
-void TouchingRods::cover(const Configuration &c, int r) const {
-  const RodRange &rod = elements_.rods[std::size_t(r)];
-  bool covered = !room_.middle.empty();
-  for (int i = 0; i < rod.vertices && covered; ++i) {
-    const std::size_t v = std::size_t(rod.first_vertex + i);
-    covered = (c.positionAt(rod.slot(i)) - room_.middle[v]).norm() <= room_.radius[v];
+/// Those of one rod that the way takes near each other, and all of two rods. \param all of one rod, too
+void TouchingRods::expect(const Configuration &start, const Planes &way, bool all) {
+  int count = 0;
+  for (const EdgePair &p : pairs_.items) {
+    bool expected = all || p.rod != p.to_rod;
+    if (!expected) {
+      const std::array<Vec3, 4> x = pointsOf(p, start);
+      std::array<Vec3, 4> ways;
+      for (std::size_t k = 0; k < 4; ++k) ways[k] = way.vector(0, p.slot[k]);
+      const double near = radiiOf(p) + 3 * lawOf(p).reach();
+      expected = closest(x[0], x[1], x[2], x[3]).distance < near || freePart(x, ways, near, 0.1 * widthOf(p)) < 1;
+    }
+    expected_[std::size_t(p.number)] = expected ? count++ : -1;
   }
+}
+
+std::vector<EdgePair> TouchingRods::expected() const {
+  std::vector<EdgePair> pairs;
+  std::copy_if(pairs_.items.begin(), pairs_.items.end(), std::back_inserter(pairs),
+               [&](const EdgePair &p) { return expectedNumber(p) >= 0; });
+  return pairs;
+}
+
+void TouchingRods::cover(const Configuration &c, int r) const {
+  const bool covered = !room_.start.empty() && isInRoom(c, c, 0, r);
   if (covered) return;
   makeRoom(c, nullptr, 1);
   take(neighbours_.find(room_));
@@ -38,22 +59,45 @@ double TouchingRods::wallOf(const EdgePair &p) const {
   return settings(p.rod).isBarrier() ? wall - 0.25 * widthOf(p) : wall;
 }
 
-/// Vertices go along their ways, and about as much to all sides.
+/// Vertices go along their ways, and a part as far to all sides.
 void TouchingRods::makeRoom(const Configuration &start, const Planes *way, double room) const {
-  room_.middle.resize(std::size_t(elements_.vertices()));
-  room_.radius.resize(room_.middle.size());
+  constexpr double part = 0.25;
+  room_.start.resize(std::size_t(elements_.vertices()));
+  room_.way.assign(room_.start.size(), Vec3::Zero());
+  room_.beyond.resize(room_.start.size());
   for (std::size_t r = 0; r < scene_.rods.size(); ++r) {
     const RodRange &rod = elements_.rods[r];
     double most = 0;
-    for (int i = 0; i < rod.vertices && way; ++i) most = std::max(most, way->vector(0, rod.slot(i)).norm());
-    const double beyond = room * std::max(settings(int(r)).radius, std::min(most, elements_.length(int(r))));
     for (int i = 0; i < rod.vertices; ++i) {
       const std::size_t v = std::size_t(rod.first_vertex + i);
-      const Vec3 half = way ? Vec3(0.5 * way->vector(0, rod.slot(i))) : Vec3(Vec3::Zero());
-      room_.middle[v] = start.positionAt(rod.slot(i)) + half;
-      room_.radius[v] = half.norm() + beyond;
+      room_.start[v] = start.positionAt(rod.slot(i));
+      if (way) room_.way[v] = way->vector(0, rod.slot(i));
+      most = std::max(most, room_.way[v].norm());
     }
+    const double beyond = room * std::max(settings(int(r)).radius, part * std::min(most, elements_.length(int(r))));
+    std::fill_n(room_.beyond.begin() + rod.first_vertex, rod.vertices, beyond);
   }
+}
+
+/// Whether a rod is in its room at a part of the straight way between two configurations.
+bool TouchingRods::isInRoom(const Configuration &from, const Configuration &to, double part, int r) const {
+  const RodRange &rod = elements_.rods[std::size_t(r)];
+  auto moved = [&](int i) {
+    const Vec3 x = from.positionAt(rod.slot(i));
+    return Vec3(x + part * (to.positionAt(rod.slot(i)) - x) - room_.start[std::size_t(rod.first_vertex + i)]);
+  };
+  double along = 0, all = 0;
+  for (int i = 0; i < rod.vertices; ++i) {
+    const Vec3 &way = room_.way[std::size_t(rod.first_vertex + i)];
+    along += way.dot(moved(i));
+    all += way.squaredNorm();
+  }
+  const double gone = all > 0 ? std::clamp(along / all, 0.0, 1.0) : 0;
+  for (int i = 0; i < rod.vertices; ++i) {
+    const std::size_t v = std::size_t(rod.first_vertex + i);
+    if (!((moved(i) - gone * room_.way[v]).squaredNorm() <= room_.beyond[v] * room_.beyond[v])) return false;
+  }
+  return true;
 }
 
 void TouchingRods::take(std::vector<EdgePair> pairs) const {
@@ -61,6 +105,7 @@ void TouchingRods::take(std::vector<EdgePair> pairs) const {
   pairs_.items = std::move(pairs);
   pairs_.sort(scene_.rods.size());
   goes_on_.clear();
+  expected_.assign(pairs_.items.size(), -1);
   of_rod_.assign(scene_.rods.size(), {});
   auto goesOn = [&](int rod, int edge, int to_rod, int to_edge) {
     const RodRange &range = elements_.rods[std::size_t(to_rod)];
@@ -86,18 +131,17 @@ double TouchingRods::smallestGap(const Configuration &c, int r) const {
 }
 
 double TouchingRods::freeFraction(const Configuration &from, const Configuration &to, int r) const {
-  constexpr double near = 0.2, short_of = 0.99;
+  constexpr double near = 0.2;
   double free = 1;
-  const RodRange &rod = elements_.rods[std::size_t(r)];
-  for (int i = 0; i < rod.vertices; ++i) {
-    const std::size_t v = std::size_t(rod.first_vertex + i);
-    const Vec3 end = to.positionAt(rod.slot(i));
-    if ((end - room_.middle[v]).norm() <= room_.radius[v]) continue;
-    const Vec3 begin = from.positionAt(rod.slot(i));
-    const double rest = room_.radius[v] - (begin - room_.middle[v]).norm();
-    free = std::min(free, short_of * std::max(rest, 0.0) / (end - begin).norm());
+  if (!isInRoom(from, to, 1, r)) {
+    ++bounded_[std::size_t(r)];
+    double beyond = 1;
+    free = 0;
+    for (int k = 0; k < 6; ++k) {
+      const double middle = 0.5 * (free + beyond);
+      (isInRoom(from, to, middle, r) ? free : beyond) = middle;
+    }
   }
-  if (free < 1) ++bounded_[std::size_t(r)];
   for (const EdgePair &p : pairs_.of({r, r + 1})) {
     const std::array<Vec3, 4> x = pointsOf(p, from);
     const double wall = wallOf(p);

@@ -95,8 +95,9 @@ TEST(Neighbours, AreFoundByTheGridAsByLookingAtAll) {
     const Neighbours neighbours(sim.scene, *sim.elements);
     Room room;
     for (const Vec3 &x : sim.state.position) {
-      room.middle.push_back(x);
-      room.radius.push_back(0.01 * std::abs(random()));
+      room.start.push_back(x);
+      room.way.push_back(0.01 * random.vector());
+      room.beyond.push_back(0.01 * std::abs(random()));
     }
     const std::vector<EdgePair> grid = neighbours.find(room), all = neighbours.findByAll(room);
     ASSERT_EQ(grid.size(), all.size());

@@ -9,10 +9,11 @@
 
 namespace tendril {
 
-/// Where each vertex of the scene may be: no farther from a place than so much [m].
+/// Where the vertices of the scene may be: those of a rod have all gone the same part of their ways from where they
+/// were, and are no farther from there than so much [m].
 struct Room {
-  std::vector<Vec3> middle;
-  std::vector<double> radius;
+  std::vector<Vec3> start, way;
+  std::vector<double> beyond;
 };
 
 class Neighbours {
@@ -20,7 +21,8 @@ public:
   Neighbours(const Scene &scene, const Elements &elements);
 
   /// Pairs of edges that may come within the reach of their law while vertices keep to their room, in the order of
-  /// the rods and edges of the later one. Found by a grid: the cost goes with the edges and with what is near.
+  /// the rods and edges of the later one. Rods may have gone different parts of their ways. Found by a grid: the cost
+  /// goes with the edges and with what is near.
   std::vector<EdgePair> find(const Room &room) const;
   /// The same by looking at all of them, for tests.
   std::vector<EdgePair> findByAll(const Room &room) const;

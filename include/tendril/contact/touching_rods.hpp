@@ -33,6 +33,13 @@ public:
   /// Finds what touches anew where a rod is not where it has been looked for.
   void cover(const Configuration &c, int rod) const;
   const ByRod<EdgePair> &pairs() const { return pairs_; }
+  /// Those that the matrix has to know of. Edges of one rod that the step is not expected to bring together are only
+  /// watched: a rod that does not touch itself is solved as one that cannot.
+  std::vector<EdgePair> expected() const;
+  /// Number of a pair among these, or -1 of one that is watched.
+  int expectedNumber(const EdgePair &p) const { return expected_[std::size_t(p.number)]; }
+  /// Takes note that a watched pair touches: the step has to be begun again, with all of them expected.
+  void note(const EdgePair &p) const { surprised_[std::size_t(p.rod)] = true; }
   /// Those of a rod, which it has or another one.
   const std::vector<int> &pairsOf(int rod) const { return of_rod_[std::size_t(rod)]; }
 
@@ -61,14 +68,17 @@ public:
   /// Part of the straight way on which no pair that a rod has passes its wall, and its vertices stay where all that
   /// they may touch is known.
   double freeFraction(const Configuration &from, const Configuration &to, int rod) const;
-  int timesBounded(int rod) const { return bounded_[std::size_t(rod)]; }
+  /// See Term::timesBounded; what has been noted counts for many.
+  int timesBounded(int rod) const { return surprised_[std::size_t(rod)] ? 1 << 20 : bounded_[std::size_t(rod)]; }
 
 private:
   const Scene &scene_;
   const Elements &elements_;
   const Neighbours neighbours_;
   std::vector<double> stiffness_;
-  mutable std::vector<int> bounded_; ///< per rod
+  mutable std::vector<int> bounded_;    ///< per rod
+  mutable std::vector<char> surprised_; ///< per rod: whether a watched pair touches
+  mutable std::vector<int> expected_;   ///< per pair
   mutable Room room_;
   mutable ByRod<EdgePair> pairs_;
   mutable std::vector<std::array<char, 2>> goes_on_; ///< per pair and side: whether the edge behind the other touches
@@ -81,7 +91,9 @@ private:
   }
   double wallOf(const EdgePair &p) const;
   void makeRoom(const Configuration &start, const Planes *way, double room) const;
+  bool isInRoom(const Configuration &from, const Configuration &to, double part, int rod) const;
   void take(std::vector<EdgePair> pairs) const;
+  void expect(const Configuration &start, const Planes &way, bool all);
   void setStiffness(const State &state, const Configuration &start, const Planes &way, const Step &step);
   /// No more than the distance of both edges.
   static double farApart(const std::array<Vec3, 4> &x) {
