@@ -59,9 +59,8 @@ double TouchingRods::wallOf(const EdgePair &p) const {
   return settings(p.rod).isBarrier() ? wall - 0.25 * widthOf(p) : wall;
 }
 
-/// Vertices go along their ways, and a part as far to all sides.
+/// Vertices go along their ways, and as far to all sides.
 void TouchingRods::makeRoom(const Configuration &start, const Planes *way, double room) const {
-  constexpr double part = 0.25;
   room_.start.resize(std::size_t(elements_.vertices()));
   room_.way.assign(room_.start.size(), Vec3::Zero());
   room_.beyond.resize(room_.start.size());
@@ -74,7 +73,7 @@ void TouchingRods::makeRoom(const Configuration &start, const Planes *way, doubl
       if (way) room_.way[v] = way->vector(0, rod.slot(i));
       most = std::max(most, room_.way[v].norm());
     }
-    const double beyond = room * std::max(settings(int(r)).radius, part * std::min(most, elements_.length(int(r))));
+    const double beyond = room * std::max(settings(int(r)).radius, std::min(most, elements_.length(int(r))));
     std::fill_n(room_.beyond.begin() + rod.first_vertex, rod.vertices, beyond);
   }
 }
