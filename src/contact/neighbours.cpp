@@ -100,6 +100,21 @@ bool Neighbours::mayTouch(int rod, int edge, int to_rod, int to_edge) const {
          });
 }
 
+/// The box in which an edge may be, with its radius and half of what its law reaches.
+std::array<Vec3, 2> Neighbours::boxOf(const Room &room, int rod, int edge) const {
+  const RodRange &range = elements_.rods[std::size_t(rod)];
+  const std::size_t a = std::size_t(range.first_vertex + edge),
+                    b = std::size_t(range.first_vertex + (edge + 1) % range.vertices);
+  const double about = scene_.rods[std::size_t(rod)].contact.radius + 0.25 * width_[std::size_t(rod)] +
+                       std::max(room.beyond[a], room.beyond[b]);
+  Vec3 low = room.start[a], high = low;
+  for (const Vec3 &x : {room.start[b], Vec3(room.start[a] + room.way[a]), Vec3(room.start[b] + room.way[b])}) {
+    low = low.cwiseMin(x);
+    high = high.cwiseMax(x);
+  }
+  return {low.array() - about, high.array() + about};
+}
+
 bool Neighbours::isNear(const Room &room, int rod, int edge, int to_rod, int to_edge) const {
   std::array<Vec3, 4> x, way;
   double away = scene_.rods[std::size_t(rod)].contact.radius + scene_.rods[std::size_t(to_rod)].contact.radius +
@@ -118,6 +133,9 @@ bool Neighbours::isNear(const Room &room, int rod, int edge, int to_rod, int to_
     }
     away += most;
   }
+  const auto [low, high] = boxOf(room, rod, edge);
+  const auto [other_low, other_high] = boxOf(room, to_rod, to_edge);
+  if ((low.array() > other_high.array()).any() || (other_low.array() > high.array()).any()) return false;
   if (closest(x[0], x[1], x[2], x[3]).distance < away) return true;
   return together && freePart(x, way, away, 1e-3 * away) < 1;
 }
@@ -162,19 +180,9 @@ std::vector<EdgePair> Neighbours::find(const Room &room) const {
   Vec3 origin = Vec3::Constant(HUGE_VAL), far = -origin;
   for (int r = 0; r < int(elements_.rods.size()); ++r) {
     const RodRange &rod = elements_.rods[std::size_t(r)];
-    const ContactSettings &c = scene_.rods[std::size_t(r)].contact;
-    if (!c.touchesRods()) continue;
+    if (!scene_.rods[std::size_t(r)].contact.touchesRods()) continue;
     for (int i = 0; i < rod.edges; ++i) {
-      const std::size_t a = std::size_t(rod.first_vertex + i),
-                        b = std::size_t(rod.first_vertex + (i + 1) % rod.vertices);
-      const double about = c.radius + 0.25 * width_[std::size_t(r)] + std::max(room.beyond[a], room.beyond[b]);
-      Vec3 low = room.start[a], high = low;
-      for (const Vec3 &x : {room.start[b], Vec3(room.start[a] + room.way[a]), Vec3(room.start[b] + room.way[b])}) {
-        low = low.cwiseMin(x);
-        high = high.cwiseMax(x);
-      }
-      low.array() -= about;
-      high.array() += about;
+      const auto [low, high] = boxOf(room, r, i);
       boxes.push_back({r, i, low, high});
       sizes.push_back((high - low).maxCoeff());
       origin = origin.cwiseMin(low);

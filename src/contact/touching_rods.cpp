@@ -164,7 +164,7 @@ void TouchingRods::setStiffness(const State &state, const Configuration &start, 
   const std::size_t rods = scene_.rods.size();
   const std::vector<double> before =
       state.rod_contact_stiffness.empty() ? std::vector<double>(rods, 0.0) : state.rod_contact_stiffness;
-  std::vector<double> pressure(rods, 0), momentum(rods, 0);
+  std::vector<double> pressure(rods, 0), load(rods, 0);
   std::vector<std::map<int, double>> closing(rods); // of each edge, the fastest [m]
   for (const EdgePair &p : pairs_.items) {
     const std::array<Vec3, 4> x = pointsOf(p, start);
@@ -193,14 +193,34 @@ void TouchingRods::setStiffness(const State &state, const Configuration &start, 
       stiffness_[r] = before[r];
       continue;
     }
-    double stopping = 0;
+    load[r] = loadScale(scene_, elements_, int(r), elements_.length(int(r)));
     const RodRange &rod = elements_.rods[r];
-    for (const auto &[edge, fastest] : closing[r])
-      stopping += scene_.rods[r].material.linear_density * elements_.restLength()[rod.slot(edge)] * fastest /
-                  (step.dt * step.dt);
-    stiffness_[r] =
-        barrierStiffness(scene_, elements_, loadScale(scene_, elements_, int(r), elements_.length(int(r))) + stopping,
-                         pressure[r], step.isStatic(), int(r));
+    for (const auto &[edge, fastest] : closing[r]) // what stops it
+      load[r] += scene_.rods[r].material.linear_density * elements_.restLength()[rod.slot(edge)] * fastest /
+                 (step.dt * step.dt);
+    stiffness_[r] = barrierStiffness(scene_, elements_, load[r], pressure[r], step.isStatic(), int(r));
+  }
+  if (!step.isStatic() && state.rod_contact_stiffness.empty()) bearAsDrawn(start, load);
+}
+
+/// What is drawn touching is not thrown off: each rod is pressed by no more than its loads, and those that touch it by
+/// no more than that.
+void TouchingRods::bearAsDrawn(const Configuration &start, const std::vector<double> &load) {
+  constexpr double least = 1e-3;
+  std::vector<double> pressed(load.size(), 0), borne = stiffness_;
+  for (const EdgePair &p : pairs_.items)
+    visit(p, pointsOf(p, start), lawOf(p).reach(), [&](const Touching &t) {
+      for (const int r : {p.rod, p.to_rod}) pressed[std::size_t(r)] -= t.weight * lawOf(p)(t.gap).slope;
+    });
+  auto isFixed = [&](std::size_t r) { return !settings(int(r)).isBarrier() || settings(int(r)).stiffness > 0; };
+  for (std::size_t r = 0; r < load.size(); ++r)
+    if (pressed[r] > load[r] && !isFixed(r)) borne[r] *= std::max(load[r] / pressed[r], least);
+  for (const EdgePair &p : pairs_.items) {
+    bool touches = false;
+    visit(p, pointsOf(p, start), lawOf(p).reach(), [&](const Touching &) { touches = true; });
+    const double both = std::min(borne[std::size_t(p.rod)], borne[std::size_t(p.to_rod)]);
+    for (const int r : {p.rod, p.to_rod})
+      if (touches && !isFixed(std::size_t(r))) stiffness_[std::size_t(r)] = std::min(stiffness_[std::size_t(r)], both);
   }
 }
 

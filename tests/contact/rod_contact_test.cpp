@@ -309,6 +309,21 @@ TEST(RodContact, RodsRestOnEachOther) {
   EXPECT_LT(iterations, 8 * 100);
 }
 
+/// Drawn touching, with the gap zero, a wire lies on the other from the first step on: it is not thrown off, as a
+/// barrier of ten times its weight would.
+TEST(RodContact, WhatIsDrawnTouchingIsNotThrownOff) {
+  Scene scene;
+  scene.gravity = Vec3(0, 0, -9.81);
+  scene.rods = {wire("beam", Vec3(-0.1, 0, 0), Vec3(0.1, 0, 0), 16, 0.005, 1e9),
+                wire("wire", Vec3(-0.08, 0, 0.01), Vec3(0.08, 0, 0.01), 16)};
+  for (const int v : {0, 16}) scene.supports.push_back(hold(scene, 0, v, Support::Kind::clamp));
+  Simulation sim;
+  runTo(sim, scene, dynamics(0.002, 0.1));
+  const double weight = scene.rods[1].material.linear_density * 9.81 * 0.16;
+  for (int v = 17; v < 34; ++v) EXPECT_NEAR(sim.state.position[std::size_t(v)][2], 0.01, 5e-4) << v;
+  EXPECT_LT(0.5 * weight / 9.81 * sim.state.velocity[25].squaredNorm(), 1e-4 * weight * 0.001);
+}
+
 TEST(RodContact, FastRodsDoNotPassThroughEachOther) {
   for (const double speed : {1.0, 10.0, 100.0})
     for (const double angle : {90.0, 30.0}) {

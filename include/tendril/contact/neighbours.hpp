@@ -48,6 +48,7 @@ private:
   double lengthOf(int rod, int edge) const;
   double alongRod(int rod, int edge, int to_edge) const;
   double toArc(int rod, int edge, double arc) const;
+  std::array<Vec3, 2> boxOf(const Room &room, int rod, int edge) const;
   bool isNear(const Room &room, int rod, int edge, int to_rod, int to_edge) const;
   EdgePair pairOf(int rod, int edge, int to_rod, int to_edge) const;
   void addJoint(int rod, int vertex, int to_rod, int to_vertex);

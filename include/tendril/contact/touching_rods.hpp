@@ -95,6 +95,7 @@ private:
   void take(std::vector<EdgePair> pairs) const;
   void expect(const Configuration &start, const Planes &way, bool all);
   void setStiffness(const State &state, const Configuration &start, const Planes &way, const Step &step);
+  void bearAsDrawn(const Configuration &start, const std::vector<double> &load);
   /// No more than the distance of both edges.
   static double farApart(const std::array<Vec3, 4> &x) {
     return 0.5 * ((x[0] + x[1] - x[2] - x[3]).norm() - (x[1] - x[0]).norm() - (x[3] - x[2]).norm());
