@@ -87,7 +87,8 @@ void colliderActions(const Scene &scene, const std::vector<ContactReading> &read
   }
 }
 
-std::vector<Meeting> overlapsOfRods(const Scene &scene, const Elements &elements, const Configuration &c) {
+std::vector<Meeting> overlapsOfRods(const Scene &scene, const Elements &elements, const Configuration &c,
+                                    double within) {
   std::vector<Meeting> found;
   if (!scene.touchesRods()) return found;
   const Neighbours neighbours(scene, elements);
@@ -99,7 +100,7 @@ std::vector<Meeting> overlapsOfRods(const Scene &scene, const Elements &elements
     const ContactSettings &a = scene.rods[std::size_t(p.rod)].contact, &b = scene.rods[std::size_t(p.to_rod)].contact;
     const Closest near =
         closest(c.positionAt(p.slot[0]), c.positionAt(p.slot[1]), c.positionAt(p.slot[2]), c.positionAt(p.slot[3]));
-    if (near.distance > wallBetween(a, b)) continue;
+    if (near.distance > wallBetween(a, b) + within) continue;
     auto arc = [&](int rod, int edge, double part) {
       return neighbours.arc(rod, edge) + part * elements.restLength()[elements.rods[std::size_t(rod)].slot(edge)];
     };

@@ -69,6 +69,25 @@ std::string nearObstacle(const IncrementalPotential &potential, RodSet rods) {
   return hint.str();
 }
 
+std::string nearRod(const IncrementalPotential &potential, RodSet rods) {
+  const Scene &scene = potential.scene();
+  std::ostringstream hint;
+  if (!potential.touchesRods()) return {};
+  double within = HUGE_VAL; // a quarter of the barrier
+  for (int r = rods.begin; r < rods.end; ++r)
+    if (const ContactSettings &c = scene.rods[r].contact; c.touchesRods() && c.isBarrier())
+      within = std::min(within, 0.25 * c.distance);
+  for (const Meeting &m :
+       overlapsOfRods(scene, potential.elements(), potential.iterate(), std::isfinite(within) ? within : 0)) {
+    if (m.rod < rods.begin || m.rod >= rods.end) continue;
+    hint << std::setprecision(3) << "; rod '" << scene.rods[m.rod].name << "' at arc length " << m.arc
+         << " m is pressed against " << (m.rod == m.to_rod ? "itself" : "rod '" + scene.rods[m.to_rod].name + "'")
+         << " at " << m.to_arc << " m, the gap is " << m.gap << " m: shorter steps help against impacts";
+    break;
+  }
+  return hint.str();
+}
+
 std::string fastBody(const IncrementalPotential &potential, RodSet rods) {
   std::ostringstream hint;
   for (const JoinedBody &b : potential.elements().bodies(rods)) {

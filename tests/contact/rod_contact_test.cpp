@@ -324,6 +324,29 @@ TEST(RodContact, WhatIsDrawnTouchingIsNotThrownOff) {
   EXPECT_LT(0.5 * weight / 9.81 * sim.state.velocity[25].squaredNorm(), 1e-4 * weight * 0.001);
 }
 
+/// Supports that drive a rod through one that is held end the run, with both rods in the message.
+TEST(RodContact, TellsOfRodsThatAreDrivenIntoEachOther) {
+  Scene scene;
+  scene.gravity = Vec3::Zero();
+  scene.rods = {wire("low", Vec3(-0.02, 0, 0), Vec3(0.02, 0, 0), 4, 0.005, 1e9),
+                wire("high", Vec3(0, -0.02, 0.012), Vec3(0, 0.02, 0.012), 4, 0.005, 1e9)};
+  for (const int r : {0, 1})
+    for (int v = 0; v <= 4; ++v) scene.supports.push_back(hold(scene, r, v, Support::Kind::pin));
+  for (Support &s : scene.supports)
+    if (s.rod == 1) s.motion.velocity = Vec3(0, 0, -0.5);
+  Simulation sim;
+  EXPECT_PETSC(sim.setUp(scene, dynamics(0.001, 0.02)));
+  LoopSettings settings = dynamics(0.001, 0.02);
+  TimeLoop loop(sim.solver, settings);
+  bool finished = true;
+  EXPECT_PETSC(loop.run(
+      sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+  EXPECT_FALSE(finished);
+  EXPECT_NE(loop.failure().find("rod 'high' at arc length"), std::string::npos) << loop.failure();
+  EXPECT_NE(loop.failure().find("is pressed against rod 'low'"), std::string::npos) << loop.failure();
+  EXPECT_GT(sim.state.position[7][2] - sim.state.position[2][2], 0.0094);
+}
+
 TEST(RodContact, FastRodsDoNotPassThroughEachOther) {
   for (const double speed : {1.0, 10.0, 100.0})
     for (const double angle : {90.0, 30.0}) {

@@ -56,8 +56,9 @@ struct Meeting {
   double gap;         ///< between surfaces [m]
   double arc, to_arc; ///< along the rods at rest [m]
 };
-/// Edges of rods that are drawn closer than their law lets them come, the deepest first.
-std::vector<Meeting> overlapsOfRods(const Scene &scene, const Elements &elements, const Configuration &c);
+/// Edges of rods that are closer than their law lets them come, the deepest first. \param within so much of that [m]
+std::vector<Meeting> overlapsOfRods(const Scene &scene, const Elements &elements, const Configuration &c,
+                                    double within = 0);
 /// The least gap of each body and obstacle near it; `rod` is the body's number.
 std::vector<Touch> tightestOfBodies(const Scene &scene, const Elements &elements, const Configuration &c);
 /// That of each rod and obstacle near it, the least gap first.

@@ -14,6 +14,9 @@ std::string nearBarrier(const IncrementalPotential &potential, RodSet rods);
 /// On the first rod that is pressed hard against an obstacle.
 std::string nearObstacle(const IncrementalPotential &potential, RodSet rods);
 
+/// On the two rods that are pressed hardest against each other, or a rod against itself.
+std::string nearRod(const IncrementalPotential &potential, RodSet rods);
+
 /// On the first body that turns by more than a radian in the step.
 std::string fastBody(const IncrementalPotential &potential, RodSet rods);
 
