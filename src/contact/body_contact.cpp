@@ -163,8 +163,7 @@ public:
     each(rod, [&](const BodyContacts &contacts, const JoinedBody &b) {
       OfSliding &s = sliding_[std::size_t(b.body)];
       s.points.clear();
-      s.rounds = 0;
-      s.swings = false;
+      s.rounds = {};
       s.start = &start;
       const double time = step.isStatic() ? 0 : step.time > state.time ? step.time - state.time : step.dt;
       s.slides = contacts.settings().slides() && time > 0;
@@ -279,13 +278,11 @@ public:
         const Vec3 before =
             found == s.points.end() ? Vec3(Vec3::Zero()) : forceOn(*found, contacts, b, iterate).gradient;
         change += (force - before).norm();
-        if (s.swings)
+        if (s.rounds.swings)
           p.point.pressing = 0.5 * (p.point.pressing + (found == s.points.end() ? 0 : found->point.pressing));
       }
       change = size > 0 ? change / size : 0;
-      constexpr double falls = 0.9; // rounds that go to and fro are led to their middle
-      s.swings = s.swings || (++s.rounds > 2 && change > falls * s.change);
-      s.change = change;
+      s.rounds.add(change);
       s.points = std::move(now);
       most = std::max(most, change);
     });
@@ -305,9 +302,7 @@ private:
     std::vector<Slid> points;
     Sliding sliding;
     const Configuration *start = nullptr;
-    int rounds = 0;      ///< of the step, in which normal forces were taken anew
-    bool swings = false; ///< whether they go to and fro
-    double change = 0;   ///< of friction in the last of them, of itself
+    SlidingRounds rounds;
   };
   const Scene &scene_;
   const Elements &elements_;

@@ -167,11 +167,9 @@ public:
       change += (force.gradient - before).norm();
     }
     change = size > 0 ? change / size : 0;
-    constexpr double falls = 0.9; // rounds that go to and fro are led to their middle
-    sliding.swings = sliding.swings || (++sliding.rounds > 2 && change > falls * sliding.change);
-    if (sliding.swings)
+    sliding.rounds.add(change);
+    if (sliding.rounds.swings)
       for (std::size_t k = 0; k < now.size(); ++k) now[k].pressing = 0.5 * (now[k].pressing + pressed[k]);
-    sliding.change = change;
     sliding.points = std::move(now);
     return change;
   }
@@ -206,9 +204,7 @@ private:
     Sliding sliding;
     const Configuration *start = nullptr;
     bool anchored = false;
-    int rounds = 0;                    ///< of the step, in which normal forces were taken anew
-    bool swings = false;               ///< whether they go to and fro
-    double change = 0;                 ///< of friction in the last of them, of itself
+    SlidingRounds rounds;
     std::vector<ContactMemory> before; ///< at the start of the step
   };
   bool slides_ = false;
@@ -288,8 +284,7 @@ private:
     const double time = step.isStatic() ? 0 : step.time > state.time ? step.time - state.time : step.dt;
     OfSliding &sliding = sliding_[r];
     sliding.anchored = settings.isAnchored(step.isStatic());
-    sliding.rounds = 0;
-    sliding.swings = false;
+    sliding.rounds = {};
     sliding.sliding = {sliding.anchored || step.isStatic() ? settings.slip_length : settings.fall_off_velocity * time,
                        time};
     sliding.start = &start;

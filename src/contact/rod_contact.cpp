@@ -144,14 +144,11 @@ public:
       }
       size += std::max(p.own.coefficient * p.own.pressing, force.norm());
       change += (force - before).norm();
-      if (s.swings) p.own.pressing = 0.5 * (p.own.pressing + pressed);
+      if (s.rounds.swings) p.own.pressing = 0.5 * (p.own.pressing + pressed);
     }
     change = size > 0 ? change / size : 0;
-    constexpr double falls = 0.9; // rounds that go to and fro are led to their middle
-    s.swings = s.swings || (++s.rounds > 2 && change > falls * s.change);
-    s.change = change;
     s.points = std::move(now);
-    return change;
+    return s.rounds.add(change);
   }
   void commit(State &state, const Configuration &, int r) const override {
     state.rod_contact_stiffness.resize(scene_.rods.size(), 0);
@@ -161,9 +158,7 @@ public:
 private:
   struct OfSliding {
     std::vector<SlidingPair> points;
-    int rounds = 0;      ///< of the step, in which normal forces were taken anew
-    bool swings = false; ///< whether they go to and fro
-    double change = 0;   ///< of friction in the last of them, of itself
+    SlidingRounds rounds;
   };
   const Scene &scene_;
   const Elements &elements_;

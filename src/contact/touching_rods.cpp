@@ -31,8 +31,8 @@ void TouchingRods::expect(const Configuration &start, const Planes &way, bool al
       const std::array<Vec3, 4> x = pointsOf(p, start);
       std::array<Vec3, 4> ways;
       for (std::size_t k = 0; k < 4; ++k) ways[k] = way.vector(0, p.slot[k]);
-      const double near = radiiOf(p) + 3 * lawOf(p).reach();
-      expected = closest(x[0], x[1], x[2], x[3]).distance < near || freePart(x, ways, near, 0.1 * widthOf(p)) < 1;
+      expected =
+          nearlyTouch(scene_, p, x) || freePart(x, ways, radiiOf(p) + 3 * lawOf(p).reach(), 0.1 * widthOf(p)) < 1;
     }
     expected_[std::size_t(p.number)] = expected ? count++ : -1;
   }

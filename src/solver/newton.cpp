@@ -162,7 +162,7 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
   rtol_ = rtol *= sharpness_;
   report_.iterations = int(iteration);
   constexpr double rtol_obstacles = 0.1;
-  constexpr int most_bounded = 8; // trials
+  constexpr int most_bounded = 8, surprised = 1 << 16; // trials; more where edges touch that the matrix does not know
   const bool moving = potential_->remainingMotion(rods_, work_->motion);
   bool done = true, finite = true, lost = false;
   creeps_ = false;
@@ -196,13 +196,16 @@ PetscErrorCode NewtonSolver::testConvergence(PetscInt iteration, SNESConvergedRe
   report_.history.push_back(worst.force);
   watch().beat();
   *reason = SNES_CONVERGED_ITERATING;
+  const int bounded = potential_->timesBounded(rods_);
   if (!finite)
     *reason = SNES_DIVERGED_FNORM_NAN;
+  else if (bounded >= surprised)
+    *reason = SNES_DIVERGED_FUNCTION_COUNT;
   else if (lost || creeps_)
     *reason = SNES_DIVERGED_LOCAL_MIN; // its meaning here: what is left is rounding
   else if (done)
     *reason = SNES_CONVERGED_FNORM_RELATIVE;
-  else if (potential_->timesBounded(rods_) > most_bounded)
+  else if (bounded > most_bounded)
     *reason = SNES_DIVERGED_FUNCTION_COUNT; // its meaning here: rods leave the room in which contact is known
   else if (iteration >= limit || (patience_ > 0 && spent_ + iteration >= patience_))
     *reason = SNES_DIVERGED_MAX_IT;

@@ -1,5 +1,5 @@
 /// How SNES and its parts are made, and what they call.
-#include "tendril/contact/neighbours.hpp"
+#include "tendril/contact/touching_rods.hpp"
 #include "tendril/solver/newton.hpp"
 
 #include <petsc/private/linesearchimpl.h>
@@ -159,9 +159,8 @@ PetscErrorCode NewtonSolver::makeMatrix() {
       const bool kept = std::binary_search(has.begin(), has.end(), p.number),
                  touches = std::any_of(entries, entries + EdgeBlocks::touching_size, [](double v) { return v != 0; });
       complete = complete && (kept || !touches);
-      std::array<Vec3, 4> x;
-      for (std::size_t k = 0; k < 4; ++k) x[k] = c.displacements<double>(p.slot[k], c, p.slot[0]);
-      if (kept || touches || nearlyTouch(potential_->scene(), p, x)) near.push_back(p.number);
+      if (kept || touches || nearlyTouch(potential_->scene(), p, TouchingRods::pointsOf(p, c)))
+        near.push_back(p.number);
     }
     if (complete) PetscFunctionReturn(0);
     has = std::move(near);

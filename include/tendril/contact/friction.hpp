@@ -34,6 +34,19 @@ struct Sliding {
   bool holds = false; ///< whether nothing slides
 };
 
+/// Rounds of a step, in each of which normal forces are taken anew.
+struct SlidingRounds {
+  bool swings = false; ///< whether they go to and fro, and are led to their middle
+  int count = 0;
+  double change = 0; ///< of friction in the last of them, of itself
+  /// Takes note of another round. \return its change
+  double add(double now) {
+    constexpr double falls = 0.9;
+    swings = swings || (++count > 2 && now > falls * change);
+    return change = now;
+  }
+};
+
 /// Derivatives by the place of the point.
 struct SlidingForce {
   double value = 0; ///< [J]
