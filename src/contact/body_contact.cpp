@@ -22,12 +22,12 @@ public:
   BodyContacts(const Scene &scene, const Elements &elements, int b)
       : scene_(scene), body_(elements.body(b)),
         samples_(surfaceSamples(scene.bodies[std::size_t(b)], elements.bodyMass(b).centre)),
-        law_(scene.bodies[std::size_t(b)].contact, forceOf(scene, elements, b)) {
+        law_(scene.bodies[std::size_t(b)].contact, pressOn(scene, elements, b)) {
     for (const BodySample &s : samples_) reach_ = std::max(reach_, s.arm.norm() + s.radius);
     const std::vector<int> &passes = settings().passes;
     for (int k = 0; k < int(scene.colliders.size()); ++k)
       if (std::find(passes.begin(), passes.end(), k) == passes.end()) met_.push_back(k);
-    if (settings().stiffness == 0) bearAsDrawn(elements.bodyMass(b).centre, loadOf(scene, elements, b));
+    if (settings().stiffness == 0) bearAsDrawn(elements.bodyMass(b).centre, loadOn(scene, elements, b));
   }
   const ContactSettings &settings() const { return scene_.bodies[std::size_t(body_.body)].contact; }
   /// Energy of a sample, a force [N] in place of a force per length.
@@ -48,8 +48,6 @@ public:
 
   /// \see RodContacts::freeFraction; the ways of samples are taken for straight.
   double freeFraction(const Configuration &from, const Configuration &to) const {
-    constexpr int most_steps = 200;
-    constexpr double safety = 0.9, near = 0.2;
     const Vec3 start = from.positionAt(body_.position), way = to.displacementAt(body_.position, from);
     const Mat3 before = from.rotationAt(body_.rotation), after = to.rotationAt(body_.rotation);
     double longest = way.norm() + (after - before).norm() * reach_;
@@ -58,29 +56,13 @@ public:
       longest += (there.position - here.position).norm() +
                  (there.rotation - here.rotation).norm() * (start - here.position).norm();
     }
-    const double wall = -0.5 * settings().distance, stop_at = near * settings().distance;
+    const double wall = -0.5 * settings().distance, stop_at = 0.2 * settings().distance;
     double free = 1;
     visitNear(from, longest + stop_at, [&](const Near &n) {
       const Shape &shape = *scene_.colliders[std::size_t(n.collider)].shape;
       const BodySample &s = sample(n.sample);
-      const Vec3 end = pose(n.collider, to).toLocal(start + way + after * s.arm), path = end - n.local;
-      double gap = n.distance - wall, done = 0;
-      const double stop = near * std::min(gap, settings().distance);
-      auto closing = [&] {
-        return shape.isConvex() ? -shape.at(n.local + done * path).gradient.dot(path) : path.norm();
-      };
-      double speed = closing();
-      for (int step = 0; step < most_steps && speed > 0 && done < free; ++step) {
-        if (gap <= stop && done > 0) {
-          free = std::min(free, done);
-          return;
-        }
-        done += safety * std::max(gap, 0.0) / speed;
-        if (done >= free) return;
-        gap = shape.at(n.local + done * path).value - s.radius - wall;
-        speed = closing();
-      }
-      if (speed > 0) free = std::min(free, done);
+      const Vec3 end = pose(n.collider, to).toLocal(start + way + after * s.arm);
+      free = std::min(free, freeWay(shape, n.local, end - n.local, s.radius, n.distance, wall, settings().distance));
     });
     return free;
   }
@@ -122,30 +104,6 @@ private:
     visitNear(centre, Mat3::Identity(), 0, law_.reach(), [&](const Near &n) { pressed -= law_(n.distance).slope; });
     if (pressed > load && std::isfinite(pressed))
       law_ = {settings(), law_.stiffness() * std::max(load / pressed, least)};
-  }
-  /// That presses on a sample where surfaces touch: the load of the body, or a part of what stops it at its first
-  /// velocity or that of an obstacle.
-  static double forceOf(const Scene &scene, const Elements &elements, int b) {
-    const Body &body = scene.bodies[std::size_t(b)];
-    const double mass = elements.bodyMass(b).mass, size = elements.bodySize(b);
-    if (body.contact.stiffness > 0) return body.contact.stiffness;
-    const double load = loadOf(scene, elements, b);
-    double speed = body.velocity.norm() + size * body.angular_velocity.norm();
-    for (const Collider &c : scene.colliders) speed = std::max(speed, fastest(c.motion, size + c.size.norm()));
-    constexpr double part = 0.1; // of what stops it within the barrier
-    return std::max({load, part * mass * speed * speed / body.contact.distance, 1e-3 * mass * size});
-  }
-  static double loadOf(const Scene &scene, const Elements &elements, int b) {
-    const Body &body = scene.bodies[std::size_t(b)];
-    return (body.gravity ? elements.bodyMass(b).mass * scene.gravity.norm() : 0) + body.force.norm() +
-           body.torque.norm() / elements.bodySize(b);
-  }
-  /// Of a point so far from what a motion turns about.
-  static double fastest(const Motion &motion, double arm) {
-    double most = motion.velocity.norm() + arm * motion.angular_velocity.norm();
-    for (const Motion::Key &k : motion.table)
-      most = std::max(most, motion.velocityAt(k.time).norm() + arm * motion.angularVelocityAt(k.time).norm());
-    return most;
   }
 };
 
@@ -267,24 +225,8 @@ public:
     each(rod, [&](const BodyContacts &contacts, const JoinedBody &b) {
       OfSliding &s = sliding_[std::size_t(b.body)];
       if (!s.slides) return;
-      std::vector<Slid> now = slidingPoints(contacts, b, iterate);
-      double change = 0, size = 0;
-      for (Slid &p : now) {
-        const auto found = std::find_if(s.points.begin(), s.points.end(), [&](const Slid &old) {
-          return old.sample == p.sample && old.point.collider == p.point.collider;
-        });
-        const Vec3 force = forceOn(p, contacts, b, iterate).gradient;
-        size += std::max(p.point.coefficient * p.point.pressing, force.norm());
-        const Vec3 before =
-            found == s.points.end() ? Vec3(Vec3::Zero()) : forceOn(*found, contacts, b, iterate).gradient;
-        change += (force - before).norm();
-        if (s.rounds.swings)
-          p.point.pressing = 0.5 * (p.point.pressing + (found == s.points.end() ? 0 : found->point.pressing));
-      }
-      change = size > 0 ? change / size : 0;
-      s.rounds.add(change);
-      s.points = std::move(now);
-      most = std::max(most, change);
+      most = std::max(most, renewSliding(s.points, slidingPoints(contacts, b, iterate), s.rounds,
+                                         [&](const Slid &p) { return forceOn(p, contacts, b, iterate); }));
     });
     return most;
   }
@@ -296,6 +238,8 @@ private:
   struct Slid {
     int sample;
     SlidingPoint point;
+    SlidingPoint &slid() { return point; }
+    bool isSame(const Slid &b) const { return sample == b.sample && point.collider == b.point.collider; }
   };
   struct OfSliding {
     bool slides = false;

@@ -66,4 +66,39 @@ std::vector<BodySample> surfaceSamples(const Body &body, const Vec3 &centre) {
   return samples;
 }
 
+std::shared_ptr<const Shape> solidOf(const Body &body) {
+  if (body.solid) return body.solid;
+  if (body.shape == "sphere") return makeSphere(body.size[0]);
+  if (body.shape == "capsule") return makeCapsule(body.size[0], body.size[1]);
+  if (body.shape == "cylinder") return makeCylinder(body.size[0], body.size[1]);
+  if (body.shape == "box") return makeBox(body.size);
+  if (body.mesh) return makeMesh(*body.mesh);
+  return nullptr;
+}
+
+double loadOn(const Scene &scene, const Elements &elements, int b) {
+  const Body &body = scene.bodies[std::size_t(b)];
+  return (body.gravity ? elements.bodyMass(b).mass * scene.gravity.norm() : 0) + body.force.norm() +
+         body.torque.norm() / elements.bodySize(b);
+}
+
+/// Of a point so far from what a motion turns about.
+static double fastest(const Motion &motion, double arm) {
+  double most = motion.velocity.norm() + arm * motion.angular_velocity.norm();
+  for (const Motion::Key &k : motion.table)
+    most = std::max(most, motion.velocityAt(k.time).norm() + arm * motion.angularVelocityAt(k.time).norm());
+  return most;
+}
+
+double pressOn(const Scene &scene, const Elements &elements, int b) {
+  const Body &body = scene.bodies[std::size_t(b)];
+  const double mass = elements.bodyMass(b).mass, size = elements.bodySize(b);
+  if (body.contact.stiffness > 0) return body.contact.stiffness;
+  double speed = body.velocity.norm() + size * body.angular_velocity.norm();
+  for (const Collider &c : scene.colliders) speed = std::max(speed, fastest(c.motion, size + c.size.norm()));
+  constexpr double part = 0.1; // of what stops it within the barrier
+  return std::max(
+      {loadOn(scene, elements, b), part * mass * speed * speed / body.contact.distance, 1e-3 * mass * size});
+}
+
 } // namespace tendril

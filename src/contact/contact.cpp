@@ -143,35 +143,12 @@ public:
   double renew(const Configuration &iterate, int r) override {
     if (!of_[r] || !scene_.rods[r].contact.slides()) return 0;
     OfSliding &sliding = sliding_[r];
-    const Sliding held = sliding.sliding;
+    const Sliding before = sliding.sliding;
     sliding.sliding.holds = false;
-    std::vector<SlidingPoint> now = slidingPoints(iterate, of_[r]->law(), r);
-    double change = 0, size = 0;
-    auto same = [](const SlidingPoint &a, const SlidingPoint &b) {
-      return a.slot == b.slot && a.point == b.point && a.collider == b.collider;
-    };
-    std::size_t next = 0;        // both lists are in one order
-    std::vector<double> pressed; // before, at the same points
-    for (const SlidingPoint &point : now) {
-      const SlidingForce force = forceOn(point, iterate, r);
-      size += std::max(point.coefficient * point.pressing, force.gradient.norm());
-      const auto found = std::find_if(sliding.points.begin() + next, sliding.points.end(),
-                                      [&](const SlidingPoint &old) { return same(old, point); });
-      Vec3 before = Vec3::Zero();
-      pressed.push_back(0);
-      if (found != sliding.points.end()) {
-        pressed.back() = found->pressing;
-        before = forceOn(*found, held, iterate, r).gradient;
-        next = std::size_t(found - sliding.points.begin()) + 1;
-      }
-      change += (force.gradient - before).norm();
-    }
-    change = size > 0 ? change / size : 0;
-    sliding.rounds.add(change);
-    if (sliding.rounds.swings)
-      for (std::size_t k = 0; k < now.size(); ++k) now[k].pressing = 0.5 * (now[k].pressing + pressed[k]);
-    sliding.points = std::move(now);
-    return change;
+    return renewSliding(
+        sliding.points, slidingPoints(iterate, of_[r]->law(), r), sliding.rounds,
+        [&](const SlidingPoint &point) { return forceOn(point, iterate, r); },
+        [&](const SlidingPoint &point) { return forceOn(point, before, iterate, r); });
   }
   void addEnergies(const State &state, const Configuration &c, double, int r, EnergyBudget &out) const override {
     if (!of_[r]) return;

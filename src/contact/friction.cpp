@@ -15,6 +15,14 @@ const ContactMemory *find(const std::vector<ContactMemory> &memory, int edge, in
   return found != memory.end() && found->key() == key ? &*found : nullptr;
 }
 
+ContactSettings bothSlide(const ContactSettings &a, const ContactSettings &b) {
+  ContactSettings both = a;
+  for (double ContactSettings::*value : {&ContactSettings::friction, &ContactSettings::fall_off_velocity,
+                                         &ContactSettings::tangential_damping, &ContactSettings::normal_damping})
+    both.*value = std::sqrt(a.*value * b.*value);
+  return both;
+}
+
 Vec3 wayOf(const SlidingPoint &point, const Configuration &c, const Collider::Pose &pose) {
   const Vec3 from = c.positionAt(point.slot);
   const Vec3 axis = from + point.at * (c.positionAt(point.slot + 1) - from);

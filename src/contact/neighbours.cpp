@@ -21,7 +21,7 @@ double wallBetween(const ContactSettings &a, const ContactSettings &b) {
   return a.isBarrier() ? radii - 0.25 * (a.distance + b.distance) : 0.2 * radii;
 }
 
-bool nearlyTouch(const Scene &scene, const EdgePair &p, const std::array<Vec3, 4> &x) {
+bool nearlyTouch(const Scene &scene, const TouchingPair &p, const std::array<Vec3, 4> &x) {
   const ContactSettings &a = scene.rods[std::size_t(p.rod)].contact, &b = scene.rods[std::size_t(p.to_rod)].contact;
   const double reach = lawBetween(a, 1, b, 1).reach();
   return closest(x[0], x[1], x[2], x[3]).distance < a.radius + b.radius + 3 * reach;
@@ -85,7 +85,7 @@ double Neighbours::toArc(int rod, int edge, double place) const {
 
 bool Neighbours::mayTouch(int rod, int edge, int to_rod, int to_edge) const {
   const ContactSettings &a = scene_.rods[std::size_t(rod)].contact, &b = scene_.rods[std::size_t(to_rod)].contact;
-  if (!a.touchesRods() || !b.touchesRods()) return false;
+  if (!a.touchesRods() || !b.touchesRods() || a.isApartFrom(b)) return false;
   const double radii = a.radius + b.radius,
                least =
                    std::max(0.5 * pi * radii, radii + 0.5 * (width_[std::size_t(rod)] + width_[std::size_t(to_rod)]));
@@ -140,7 +140,7 @@ bool Neighbours::isNear(const Room &room, int rod, int edge, int to_rod, int to_
   return together && freePart(x, way, away, 1e-3 * away) < 1;
 }
 
-EdgePair Neighbours::pairOf(int rod, int edge, int to_rod, int to_edge) const {
+TouchingPair Neighbours::pairOf(int rod, int edge, int to_rod, int to_edge) const {
   if (std::pair(rod, edge) < std::pair(to_rod, to_edge)) {
     std::swap(rod, to_rod);
     std::swap(edge, to_edge);
@@ -167,13 +167,13 @@ struct Box {
   Vec3 low, high;
 };
 
-bool isBefore(const EdgePair &a, const EdgePair &b) {
+bool isBefore(const TouchingPair &a, const TouchingPair &b) {
   return std::tuple(a.rod, a.edge, a.to_rod, a.to_edge) < std::tuple(b.rod, b.edge, b.to_rod, b.to_edge);
 }
 
 } // namespace
 
-std::vector<EdgePair> Neighbours::find(const Room &room) const {
+std::vector<TouchingPair> Neighbours::find(const Room &room) const {
   constexpr int bits = 21, most_cells = 1 << (bits - 1); // along an axis
   std::vector<Box> boxes;
   std::vector<double> sizes;
@@ -206,7 +206,7 @@ std::vector<EdgePair> Neighbours::find(const Room &room) const {
         for (std::uint64_t z = low[2]; z <= high[2]; ++z) cells.push_back({keyOf(x, y, z), int(k)});
   }
   std::sort(cells.begin(), cells.end());
-  std::vector<EdgePair> pairs;
+  std::vector<TouchingPair> pairs;
   for (std::size_t begin = 0, end; begin < cells.size(); begin = end) {
     end = begin + 1;
     while (end < cells.size() && cells[end].cell == cells[begin].cell) ++end;
@@ -224,8 +224,8 @@ std::vector<EdgePair> Neighbours::find(const Room &room) const {
   return pairs;
 }
 
-std::vector<EdgePair> Neighbours::findByAll(const Room &room) const {
-  std::vector<EdgePair> pairs;
+std::vector<TouchingPair> Neighbours::findByAll(const Room &room) const {
+  std::vector<TouchingPair> pairs;
   const int rods = int(elements_.rods.size());
   for (int r = 0; r < rods; ++r)
     for (int i = 0; i < elements_.rods[std::size_t(r)].edges; ++i)

@@ -18,6 +18,30 @@ std::vector<SamplePoint> samplePoints(int quadrature, double longest_edge, doubl
   return points;
 }
 
+double sampleSpacing(const Shape &shape, const ContactSettings &contact) {
+  const double reach = NormalLaw(contact, contact.stiffness).reach();
+  return 0.56 * std::sqrt(2 * (shape.curvatureRadius() + contact.radius) * 2 * reach);
+}
+
+double freeWay(const Shape &shape, const Vec3 &from, const Vec3 &way, double radius, double gap, double wall,
+               double width) {
+  constexpr int most_steps = 200;
+  constexpr double safety = 0.9, near = 0.2;
+  const bool convex = shape.isConvex();
+  gap -= wall;
+  double done = 0;
+  const double stop = near * std::min(gap, width);
+  for (int step = 0; step < most_steps; ++step) {
+    const double closing = convex ? -shape.at(from + done * way).gradient.dot(way) : way.norm();
+    if (!(closing > 0)) return 1;
+    if (gap <= stop && done > 0) return done;
+    done += safety * std::max(gap, 0.0) / closing;
+    if (done >= 1) return 1;
+    gap = shape.at(from + done * way).value - radius - wall;
+  }
+  return done;
+}
+
 RodContacts::RodContacts(const Scene &scene, const Elements &elements, int rod)
     : scene_(scene), elements_(elements), settings_(scene.rods[rod].contact), rod_(elements.rods[rod]), index_(rod),
       law_(settings_, settings_.stiffness), away_(chunks() * scene.colliders.size(), HUGE_VAL), nearest_(chunks(), 0) {
@@ -25,11 +49,8 @@ RodContacts::RodContacts(const Scene &scene, const Elements &elements, int rod)
     if (std::find(settings_.passes.begin(), settings_.passes.end(), k) == settings_.passes.end()) met_.push_back(k);
   double longest = 0;
   for (int s = rod_.first_slot; s < rod_.edgeEnd(); ++s) longest = std::max(longest, elements.restLength()[s]);
-  // A tube of this radius against a surface that curves as much touches it along about twice this length.
   for (const Collider &collider : scene.colliders)
-    points_.push_back(
-        samplePoints(settings_.quadrature, longest,
-                     0.56 * std::sqrt(2 * (collider.shape->curvatureRadius() + settings_.radius) * 2 * law_.reach())));
+    points_.push_back(samplePoints(settings_.quadrature, longest, sampleSpacing(*collider.shape, settings_)));
   for (const Collider &collider : scene.colliders) walls_.push_back(settings_.wall(*collider.shape));
   for (AlignedVector &x : seen_) x.assign(seenOf(chunks()) + lanes, 0.0);
 }

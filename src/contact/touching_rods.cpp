@@ -25,7 +25,7 @@ void TouchingRods::find(const State &state, const Configuration &start, const Pl
 /// Those of one rod that the way takes near each other, and all of two rods. \param all of one rod, too
 void TouchingRods::expect(const Configuration &start, const Planes &way, bool all) {
   int count = 0;
-  for (const EdgePair &p : pairs_.items) {
+  for (const TouchingPair &p : pairs_.items) {
     bool expected = all || p.rod != p.to_rod;
     if (!expected) {
       const std::array<Vec3, 4> x = pointsOf(p, start);
@@ -38,10 +38,10 @@ void TouchingRods::expect(const Configuration &start, const Planes &way, bool al
   }
 }
 
-std::vector<EdgePair> TouchingRods::expected() const {
-  std::vector<EdgePair> pairs;
+std::vector<TouchingPair> TouchingRods::expected() const {
+  std::vector<TouchingPair> pairs;
   std::copy_if(pairs_.items.begin(), pairs_.items.end(), std::back_inserter(pairs),
-               [&](const EdgePair &p) { return expectedNumber(p) >= 0; });
+               [&](const TouchingPair &p) { return expectedNumber(p) >= 0; });
   return pairs;
 }
 
@@ -54,7 +54,7 @@ void TouchingRods::cover(const Configuration &c, int r) const {
 
 /// Between samples edges come a little nearer to each other than samples do, whose energy is what holds them apart: no
 /// way is ended before that does.
-double TouchingRods::wallOf(const EdgePair &p) const {
+double TouchingRods::wallOf(const TouchingPair &p) const {
   const double wall = wallBetween(settings(p.rod), settings(p.to_rod));
   return settings(p.rod).isBarrier() ? wall - 0.25 * widthOf(p) : wall;
 }
@@ -99,7 +99,7 @@ bool TouchingRods::isInRoom(const Configuration &from, const Configuration &to, 
   return true;
 }
 
-void TouchingRods::take(std::vector<EdgePair> pairs) const {
+void TouchingRods::take(std::vector<TouchingPair> pairs) const {
   pairs_ = {};
   pairs_.items = std::move(pairs);
   pairs_.sort(scene_.rods.size());
@@ -111,7 +111,7 @@ void TouchingRods::take(std::vector<EdgePair> pairs) const {
     if (!range.closed && to_edge + 1 == range.edges) return false;
     return neighbours_.mayTouch(rod, edge, to_rod, (to_edge + 1) % range.edges);
   };
-  for (EdgePair &p : pairs_.items) {
+  for (TouchingPair &p : pairs_.items) {
     p.number = int(goes_on_.size());
     goes_on_.push_back({goesOn(p.rod, p.edge, p.to_rod, p.to_edge), goesOn(p.to_rod, p.to_edge, p.rod, p.edge)});
     of_rod_[std::size_t(p.rod)].push_back(p.number);
@@ -121,7 +121,7 @@ void TouchingRods::take(std::vector<EdgePair> pairs) const {
 
 double TouchingRods::smallestGap(const Configuration &c, int r) const {
   double least = HUGE_VAL;
-  for (const EdgePair &p : pairs_.of({r, r + 1})) {
+  for (const TouchingPair &p : pairs_.of({r, r + 1})) {
     const std::array<Vec3, 4> x = pointsOf(p, c);
     const double radii = radiiOf(p), apart = farApart(x) - radii;
     if (apart < least) least = std::min(least, closest(x[0], x[1], x[2], x[3]).distance - radii);
@@ -141,7 +141,7 @@ double TouchingRods::freeFraction(const Configuration &from, const Configuration
       (isInRoom(from, to, middle, r) ? free : beyond) = middle;
     }
   }
-  for (const EdgePair &p : pairs_.of({r, r + 1})) {
+  for (const TouchingPair &p : pairs_.of({r, r + 1})) {
     const std::array<Vec3, 4> x = pointsOf(p, from);
     const double wall = wallOf(p);
     std::array<Vec3, 4> way;
@@ -166,7 +166,7 @@ void TouchingRods::setStiffness(const State &state, const Configuration &start, 
       state.rod_contact_stiffness.empty() ? std::vector<double>(rods, 0.0) : state.rod_contact_stiffness;
   std::vector<double> pressure(rods, 0), load(rods, 0);
   std::vector<std::map<int, double>> closing(rods); // of each edge, the fastest [m]
-  for (const EdgePair &p : pairs_.items) {
+  for (const TouchingPair &p : pairs_.items) {
     const std::array<Vec3, 4> x = pointsOf(p, start);
     const NormalLaw law = lawOf(before, p);
     visit(p, x, law.reach(), [&](const Touching &t) {
@@ -208,14 +208,14 @@ void TouchingRods::setStiffness(const State &state, const Configuration &start, 
 void TouchingRods::bearAsDrawn(const Configuration &start, const std::vector<double> &load) {
   constexpr double least = 1e-3;
   std::vector<double> pressed(load.size(), 0), borne = stiffness_;
-  for (const EdgePair &p : pairs_.items)
+  for (const TouchingPair &p : pairs_.items)
     visit(p, pointsOf(p, start), lawOf(p).reach(), [&](const Touching &t) {
       for (const int r : {p.rod, p.to_rod}) pressed[std::size_t(r)] -= t.weight * lawOf(p)(t.gap).slope;
     });
   auto isFixed = [&](std::size_t r) { return !settings(int(r)).isBarrier() || settings(int(r)).stiffness > 0; };
   for (std::size_t r = 0; r < load.size(); ++r)
     if (pressed[r] > load[r] && !isFixed(r)) borne[r] *= std::max(load[r] / pressed[r], least);
-  for (const EdgePair &p : pairs_.items) {
+  for (const TouchingPair &p : pairs_.items) {
     bool touches = false;
     visit(p, pointsOf(p, start), lawOf(p).reach(), [&](const Touching &) { touches = true; });
     const double both = std::min(borne[std::size_t(p.rod)], borne[std::size_t(p.to_rod)]);

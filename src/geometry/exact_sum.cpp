@@ -10,7 +10,7 @@ namespace {
 
 /// Digits of 32 bits in words of 64, the first of 2^-1074; two more for carries. Behind them counts of infinities, of
 /// negative ones, and of what is not a number.
-constexpr int digits = 68, positive = digits, negative = digits + 1, undefined = digits + 2, lowest = -1074;
+constexpr int digits = 68, plus_infinity = digits, minus_infinity = digits + 1, undefined = digits + 2, lowest = -1074;
 constexpr std::int64_t mask = 0xffffffff;
 
 } // namespace
@@ -32,7 +32,7 @@ void ExactSum::spread() {
 
 void ExactSum::accumulate(double x) {
   if (!std::isfinite(x)) {
-    ++words_[std::isnan(x) ? undefined : x > 0 ? positive : negative];
+    ++words_[std::isnan(x) ? undefined : x > 0 ? plus_infinity : minus_infinity];
     return;
   }
   const auto bits = std::bit_cast<std::uint64_t>(x);
@@ -47,10 +47,10 @@ void ExactSum::accumulate(double x) {
 
 double ExactSum::value() const {
   if (words_.empty()) return first_;
-  if (words_[undefined] > 0 || (words_[positive] > 0 && words_[negative] > 0))
+  if (words_[undefined] > 0 || (words_[plus_infinity] > 0 && words_[minus_infinity] > 0))
     return std::numeric_limits<double>::quiet_NaN();
-  if (words_[positive] > 0) return std::numeric_limits<double>::infinity();
-  if (words_[negative] > 0) return -std::numeric_limits<double>::infinity();
+  if (words_[plus_infinity] > 0) return std::numeric_limits<double>::infinity();
+  if (words_[minus_infinity] > 0) return -std::numeric_limits<double>::infinity();
   std::array<std::int64_t, digits> d;
   auto carry = [&](std::int64_t sign) { // the sign of what is above all digits
     std::int64_t over = 0;

@@ -1,5 +1,6 @@
 #include "tendril/io/body_reader.hpp"
 
+#include "tendril/contact/body_samples.hpp"
 #include "tendril/geometry/rotation.hpp"
 #include "tendril/io/collider_reader.hpp"
 #include "tendril/io/mesh_reader.hpp"
@@ -13,7 +14,7 @@ namespace tendril {
 namespace {
 
 constexpr MotionKeys body_motion_keys{"bodies[].motion", "bodies[].motion.velocity", "bodies[].motion.angular_velocity",
-                                 "bodies[].motion.table"};
+                                      "bodies[].motion.table"};
 constexpr const char *shape_names = "box, sphere, capsule, cylinder or mesh";
 
 /// A closed surface.
@@ -251,6 +252,7 @@ Frame readFrame(YamlMap &map, const Rod &rod, int vertex) {
 static void readContact(YamlMap &map, const ContactSettings &of_scene, Body &body) {
   ContactSettings &contact = body.contact;
   contact.on = body.shape != "none";
+  contact.bodies = of_scene.bodies;
   contact.friction = of_scene.friction;
   contact.fall_off_velocity = of_scene.fall_off_velocity;
   contact.tangential_damping = of_scene.tangential_damping;
@@ -267,6 +269,7 @@ static void readContact(YamlMap &map, const ContactSettings &of_scene, Body &bod
   auto read = [&](KeyOf<KeyType::number> key, double &to) {
     if (block.has(*key)) to = block.number(key);
   };
+  if (block.has("bodies[].contact.bodies")) contact.bodies = block.flag("bodies[].contact.bodies");
   read("bodies[].contact.distance", contact.distance);
   read("bodies[].contact.stiffness", contact.stiffness);
   read("bodies[].contact.friction", contact.friction);
@@ -308,6 +311,8 @@ void readBody(const YamlValue &value, const ContactSettings &contact, SceneFile 
   body.force = map.vector("bodies[].force");
   body.torque = map.vector("bodies[].torque");
   readContact(map, contact, body);
+  if (body.contact.touchesBodies()) body.solid = solidOf(body);
+  if (map.has("bodies[].layer")) body.layer = readName(map.at("bodies[].layer"));
   const bool held = map.flag("bodies[].fixed") || map.has("bodies[].motion");
   if (map.has("bodies[].motion")) {
     const YamlValue motion = map.at("bodies[].motion");

@@ -82,17 +82,18 @@ constexpr ShapeKey shape_keys[] = {
      }}};
 
 struct ContactKeys {
+  KeyOf<KeyType::flag> bodies;
   KeyOf<KeyType::word, KeyType::word_or_map> rods, law, friction_at, quadrature, stick;
   KeyOf<KeyType::number> radius, distance, stiffness, threshold, smoothing, friction, fall_off_velocity, slip_length,
       tangential_damping, normal_damping;
 };
 // clang-format off
 constexpr ContactKeys of_scene{
-    "contact.rods", "contact.law", "contact.friction_at", "contact.quadrature", "contact.stick", "contact.radius",
+    "contact.bodies", "contact.rods", "contact.law", "contact.friction_at", "contact.quadrature", "contact.stick", "contact.radius",
     "contact.distance", "contact.stiffness", "contact.threshold", "contact.smoothing", "contact.friction",
     "contact.fall_off_velocity", "contact.slip_length", "contact.tangential_damping", "contact.normal_damping"};
 constexpr ContactKeys of_rod{
-    "rods[].contact.rods", "rods[].contact.law", "rods[].contact.friction_at", "rods[].contact.quadrature", "rods[].contact.stick",
+    "rods[].contact.bodies", "rods[].contact.rods", "rods[].contact.law", "rods[].contact.friction_at", "rods[].contact.quadrature", "rods[].contact.stick",
     "rods[].contact.radius", "rods[].contact.distance", "rods[].contact.stiffness", "rods[].contact.threshold",
     "rods[].contact.smoothing", "rods[].contact.friction", "rods[].contact.fall_off_velocity", "rods[].contact.slip_length",
     "rods[].contact.tangential_damping", "rods[].contact.normal_damping"};
@@ -107,6 +108,7 @@ void readSettings(YamlMap &map, const ContactKeys &keys, ContactSettings &out) {
     const std::string which = map.word(keys.rods);
     out.rods = which == "all" ? Rods::all : which == "others" ? Rods::others : Rods::none;
   }
+  if (map.has(*keys.bodies)) out.bodies = map.flag(keys.bodies);
   if (map.has(*keys.law)) {
     using Law = ContactSettings::Law;
     const Law law = map.word(keys.law) == "penalty" ? Law::penalty : Law::barrier;
@@ -166,28 +168,65 @@ void readContact(YamlMap &rod, ContactSettings &settings) {
     settings.on = rod.word("rods[].contact") != "none";
 }
 
+/// What a word of 'ignore' names: rods, bodies or colliders with that name or layer.
+struct Named {
+  std::vector<ContactSettings *> moving;
+  std::vector<int> colliders;
+};
+
+static Named named(const YamlValue &value, AnyKey key, SceneFile &out) {
+  const std::string word = value.text(), kind(key->name());
+  Named found;
+  auto add = [&](auto &things) {
+    for (auto &thing : things)
+      if (thing.name == word || thing.layer == word) found.moving.push_back(&thing.contact);
+  };
+  if (kind == "colliders") {
+    for (int k = 0; k < int(out.scene.colliders.size()); ++k)
+      if (out.scene.colliders[k].name == word || out.scene.colliders[k].layer == word) found.colliders.push_back(k);
+  } else if (kind == "bodies" || kind == "to_bodies") {
+    add(out.scene.bodies);
+    add(out.scene.held_bodies);
+  } else {
+    for (const int r : out.names.find(word)) found.moving.push_back(&out.scene.rods[r].contact);
+    for (Rod &rod : out.scene.rods)
+      if (rod.layer == word) found.moving.push_back(&rod.contact);
+  }
+  const std::string one = kind == "colliders" ? "collider" : kind.find("bodies") != std::string::npos ? "body" : "rod";
+  if (found.moving.empty() && found.colliders.empty())
+    value.fail("no " + one + " has the name or layer '" + inOneLine(word) + "'");
+  return found;
+}
+
 void readIgnored(YamlMap &scene, SceneFile &out) {
   if (!scene.has("contact")) return;
   YamlMap contact(scene.at("contact"), "contact");
   if (!contact.has("contact.ignore")) return;
+  int entries = 0;
   for (const YamlValue &value : contact.at("contact.ignore").items()) {
     YamlMap map(value, "contact.ignore");
-    const YamlValue of_rods = map.at("contact.ignore[].rods"), of_colliders = map.at("contact.ignore[].colliders");
-    const std::string word = of_rods.text(), name = of_colliders.text();
-    std::vector<int> rods = out.names.find(word), colliders;
-    for (int r = 0; r < int(out.scene.rods.size()); ++r)
-      if (out.scene.rods[r].layer == word) rods.push_back(r);
-    for (int k = 0; k < int(out.scene.colliders.size()); ++k)
-      if (out.scene.colliders[k].name == name || out.scene.colliders[k].layer == name) colliders.push_back(k);
-    if (rods.empty()) of_rods.fail("no rod has the name or layer '" + inOneLine(word) + "'");
-    if (colliders.empty()) of_colliders.fail("no collider has the name or layer '" + inOneLine(name) + "'");
-    for (const int r : rods) {
-      std::vector<int> &passes = out.scene.rods[r].contact.passes;
-      passes.insert(passes.end(), colliders.begin(), colliders.end());
+    std::vector<Named> two;
+    for (const AnyKey key :
+         {AnyKey("contact.ignore[].rods"), AnyKey("contact.ignore[].to_rods"), AnyKey("contact.ignore[].bodies"),
+          AnyKey("contact.ignore[].to_bodies"), AnyKey("contact.ignore[].colliders")})
+      if (map.has(key)) two.push_back(named(map.at(key), key, out));
+    map.finish();
+    if (two.size() != 2 || two.front().moving.empty())
+      value.fail("names two that pass through each other, as {rods: strands, colliders: floor}, {rods: left, to_rods: "
+                 "right} or {rods: strands, bodies: bob}");
+    if (two.back().colliders.empty()) {
+      if (entries == 64)
+        value.fail("is the 65th pair of rods and bodies, more than fit; give things that belong together one layer");
+      for (ContactSettings *one : two.front().moving) one->apart_from |= std::uint64_t(1) << entries;
+      for (ContactSettings *other : two.back().moving) other->apart_to |= std::uint64_t(1) << entries;
+      ++entries;
+    }
+    for (ContactSettings *one : two.front().moving) {
+      std::vector<int> &passes = one->passes;
+      passes.insert(passes.end(), two.back().colliders.begin(), two.back().colliders.end());
       std::sort(passes.begin(), passes.end());
       passes.erase(std::unique(passes.begin(), passes.end()), passes.end());
     }
-    map.finish();
   }
 }
 
@@ -198,7 +237,9 @@ void completeContact(const YamlValue &block, const Overrides &overrides, Scene &
   const Rod *one = nullptr; // the first that touches rods
   for (Rod &rod : scene.rods) {
     ContactSettings &contact = rod.contact;
-    if (!contact.on || (scene.colliders.empty() && !contact.touchesRods())) continue;
+    if (!contact.on ||
+        (scene.colliders.empty() && !contact.touchesRods() && !(contact.bodies && scene.touchesBodies())))
+      continue;
     replace("contact_stiffness", contact.stiffness);
     replace("contact_friction", contact.friction);
     replace("contact_distance", contact.distance);

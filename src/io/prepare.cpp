@@ -1,6 +1,7 @@
 #include "tendril/io/prepare.hpp"
 
 #include "tendril/contact/contact.hpp"
+#include "tendril/contact/touching_bodies.hpp"
 #include "tendril/dynamics/arc_length.hpp"
 #include "tendril/io/quiet_errors.hpp"
 #include "tendril/io/text.hpp"
@@ -34,8 +35,8 @@ void requireHeld(const Scene &scene) {
   for (const Constraint &c : scene.constraints)
     if (c.isPin() && c.isToWorld() && c.stiffness > 0) held[rootOf(c.rod)] = true;
   for (int r = 0; r < int(scene.rods.size()); ++r)
-    if (scene.touches(r) || scene.rods[r].contact.touchesRods())
-      held[rootOf(r)] = true; // what obstacles and other rods hold shows
+    if (scene.touches(r) || scene.rods[r].contact.touchesMoving())
+      held[rootOf(r)] = true; // what obstacles, other rods and bodies hold shows
   for (int b = 0; b < int(scene.bodies.size()); ++b)
     if (scene.touchesBody(b)) held[rootOf(scene.bodies[b].rod)] = true;
   std::vector<char> tied(scene.bodies.size(), false);
@@ -92,6 +93,16 @@ void refuseOverlaps(const Simulation &run) {
         " m or more apart, give them a smaller 'contact: {radius: "
         "...}', or write 'contact: {rods: " +
         (m.rod == m.to_rod ? "others}'" : "none}' for one of them"));
+  }
+  for (const BodyMeeting &m : tightestAmongBodies(scene, *run.elements, drawn)) {
+    if (m.gap > m.wall + 0.05 * m.width) continue;
+    const std::string name = scene.bodies[std::size_t(m.body)].name;
+    throw SceneError((m.rod < 0 ? "body '" + scene.bodies[std::size_t(m.other)].name + "' is drawn "
+                                : "rod '" + scene.rods[std::size_t(m.rod)].name + "' at arc length " +
+                                      shortText(m.arc) + " m is drawn ") +
+                     shortText(-m.gap) + " m deep in body '" + name + "'; move one of them by " +
+                     shortText(m.wall - m.gap + 0.5 * m.width) + " m or more, or name both in 'contact: {ignore: [{" +
+                     (m.rod < 0 ? "bodies: ..., to_bodies: ...}]}'" : "rods: ..., bodies: ...}]}'"));
   }
   for (const Touch &o : tightestOfBodies(scene, *run.elements, drawn))
     if (const Body &body = scene.bodies[std::size_t(o.rod)]; o.gap < -0.45 * body.contact.distance)
@@ -214,29 +225,29 @@ void guarded(const std::function<PetscErrorCode()> &work) {
 /// Methods that go on beyond the middle of a step may go through rods there, and friction between rods is not for
 /// statics yet.
 void refuseWithRodContact(const Scene &scene, const Options &o, std::vector<std::string> *notes) {
-  if (!scene.touchesRods()) return;
+  if (!scene.touchesMoving()) return;
   const std::string &name = o.loop.integrator.name;
   if (o.loop.dynamic && (name == "midpoint" || name == "symplectic2" || name == "energy_momentum" || name == "sdirk23"))
     throw SceneError("option -integrator " + name +
-                     ": is not for rods that touch each other ('contact: {rods: ...}'), which the ends of its steps "
-                     "may go through; take euler, bdf2 or generalized_alpha");
+                     ": is not for rods that touch each other or bodies ('contact: {rods: ...}', '{bodies: true}'), "
+                     "which the ends of its steps may go through; take euler, bdf2 or generalized_alpha");
   for (const Rod &rod : scene.rods)
-    if (!o.loop.dynamic && rod.contact.touchesRods() && rod.contact.slides())
+    if (!o.loop.dynamic && rod.contact.touchesMoving() && rod.contact.slides())
       return notes->push_back("warning: the friction of rod '" + rod.name +
-                              "' acts on other rods in steps of time only: in statics rods slide along each other "
-                              "without");
+                              "' acts on other rods and bodies in steps of time only: in statics they slide along "
+                              "each other without");
 }
 
 /// A path of equilibria has one load factor for all rods, which makes them one island.
 void makeReady(Scene scene, const Options &o, Prepared &prepared) {
   const Team world = Team::world();
   const bool path = !o.loop.dynamic && o.loop.continuation == Continuation::arclength;
-  const bool among = scene.touchesRods();
+  const bool among = scene.touchesMoving();
   const Partition parts = partition(scene, path || among ? 1 : world.size(), o.partition);
   const Team &team = prepared.team = world.first(parts.ranks);
   prepared.ranks.clear();
   if (!world.isAlone() && (path || among))
-    prepared.ranks = {(among ? "warning: rods that touch each other run on one rank yet; the other "
+    prepared.ranks = {(among ? "warning: rods that touch each other or bodies run on one rank yet; the other "
                              : std::string("warning: with -continuation arclength all rods share one load factor and "
                                            "run on one rank; the other ")) +
                       std::to_string(world.size() - 1) + " have nothing to do"};
@@ -265,7 +276,7 @@ void makeReady(Scene scene, const Options &o, Prepared &prepared) {
     if (!run) return;
     if (team.leads() && o.loop.dynamic && o.restart.empty()) refuseTearing(prepared.whole());
     const Scene &all = prepared.whole().scene;
-    if (team.leads() && (!all.colliders.empty() || all.touchesRods()) && o.restart.empty())
+    if (team.leads() && (!all.colliders.empty() || all.touchesMoving()) && o.restart.empty())
       refuseOverlaps(prepared.whole());
     guarded([&] { return run->solver.rehearse(run->state, TimeLoop::stepOf(o.loop, run->state, o.loop.dt)); });
   });
@@ -303,7 +314,7 @@ static Scene sceneFor(Prepared &prepared, Options &o) {
           std::string("option ") + (o.accuracy ? "-accuracy" : "-error_estimate") + ": constraint '" + c.name +
           "' turns an edge, whose middle moves when edges change: errors do not fall with the square of their "
           "length; take a clamp, or compare runs with -rod_edges");
-  if (!file.scene.colliders.empty() || file.scene.touchesRods()) refuseWithObstacles(o);
+  if (!file.scene.colliders.empty() || file.scene.touchesMoving()) refuseWithObstacles(o);
   refuseWithRodContact(file.scene, o, &prepared.notes);
   refuseWithJoints(file.scene, o, &prepared.notes);
   refuseFrictionOfBodies(file.scene, o);

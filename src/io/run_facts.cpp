@@ -91,7 +91,11 @@ std::string textOf(const ContactSettings &c) {
          " and " + textOf(c.normal_damping) + stick + passes +
          (!c.touchesRods()                       ? ""
           : c.rods == ContactSettings::Rods::all ? ", with all rods"
-                                                 : ", with other rods");
+                                                 : ", with other rods") +
+         (c.touchesBodies() ? ", with bodies" : "") +
+         (c.apart_from | c.apart_to
+              ? ", apart by " + std::to_string(c.apart_from) + " and " + std::to_string(c.apart_to)
+              : "");
 }
 
 std::string textOf(const Collider &c) {
@@ -291,7 +295,7 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
   add(Kind::scene, order_of_holders, "#" + holders.hex());
   for (const Collider &c : scene.colliders) add(Kind::scene, "collider '" + c.name + "'", textOf(c));
   for (const Rod &rod : scene.rods)
-    if (!scene.colliders.empty() || rod.contact.touchesRods())
+    if (!scene.colliders.empty() || rod.contact.touchesMoving())
       add(Kind::scene, "contact of rod '" + rod.name + "'", textOf(rod.contact));
   for (const NodalForce &f : scene.forces)
     if (f.mass > 0) add(Kind::scene, at("mass on vertex ", f.vertex, f.rod), textOf(f.mass));

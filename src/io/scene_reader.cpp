@@ -313,17 +313,16 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
     for (const YamlValue &v : map.at("loads").items()) readLoad(v, out);
   if (map.has("colliders"))
     for (const YamlValue &v : map.at("colliders").items()) readCollider(v, out.scene);
-  const bool touches = !out.scene.colliders.empty() || out.scene.touchesRods();
-  if (touches)
-    completeContact(map.has("colliders") ? map.at("colliders") : map.at("rods"), overrides, out.scene);
+  const bool touches = !out.scene.colliders.empty() || out.scene.touchesMoving();
+  if (touches) completeContact(map.has("colliders") ? map.at("colliders") : map.at("rods"), overrides, out.scene);
   if (map.has("contact") && !touches)
-    map.at("contact").fail("'contact' has nothing to act on: rods touch 'colliders', and each other with 'contact: "
-                           "{rods: all}'; add one of both, or take it away");
+    map.at("contact").fail("'contact' has nothing to act on: rods touch 'colliders', each other with 'contact: {rods: "
+                           "all}', and bodies with 'contact: {bodies: true}'; add one of these, or take it away");
   for (const auto &[name, value] : overrides)
     if (name.rfind("contact_", 0) == 0 && !touches)
       throw SceneError("option -" + name +
                        ": the scene has no 'colliders' that rods could touch, nor do they touch each other ('contact: "
-                       "{rods: all}')");
+                       "{rods: all}') or bodies ('contact: {bodies: true}')");
   readIgnored(map, out);
   map.finish();
   out.scene.hostBodies();

@@ -134,9 +134,9 @@ PetscErrorCode DofMap::createMatrix(RodSet rods, bool joins, Mat *matrix, Patter
     }
   }
   pattern->lasting = source_of.size();
-  for (const int number : pattern->touching) {
-    const EdgePair &p = touching_.items[std::size_t(number)];
-    const int variables = pattern->turns ? EdgePair::variables : 6;
+  for (const int place : pattern->touching) {
+    const TouchingPair &p = touching_.items[std::size_t(place)];
+    const int variables = pattern->turns ? TouchingPair::variables : 6;
     auto parts = [&](int side, int variable) {
       const auto [slot, a] = p.place(side, variable);
       std::vector<Part> parts;
@@ -148,7 +148,7 @@ PetscErrorCode DofMap::createMatrix(RodSet rods, bool joins, Mat *matrix, Patter
     };
     for (int i = 0; i < variables; ++i)
       for (int j = 0; j < variables; ++j)
-        coupleFrom(EdgeBlocks::touching_place + EdgeBlocks::touching_size * number + EdgePair::variables * i + j,
+        coupleFrom(EdgeBlocks::touching_place + EdgeBlocks::touching_size * p.number + TouchingPair::variables * i + j,
                    parts(0, i), parts(1, j), false);
   }
   PetscCall(MatCreate(PETSC_COMM_SELF, matrix));

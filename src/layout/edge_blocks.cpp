@@ -99,10 +99,10 @@ void EdgeBlocks::multiply(const RodRange &rod, const Joins &of, const Planes &x,
         y[r][t.copy] -= force;
       }
   }
-  for (const EdgePair &p : of.touching)
-    for (int r = 0; r < EdgePair::variables; ++r)
-      for (int c = 0; c < EdgePair::variables; ++c) {
-        const double v = touching(p.number)[EdgePair::variables * r + c];
+  for (const TouchingPair &p : of.touching)
+    for (int r = 0; r < TouchingPair::variables; ++r)
+      for (int c = 0; c < TouchingPair::variables; ++c) {
+        const double v = touching(p.number)[TouchingPair::variables * r + c];
         const auto [row, a] = p.place(0, r);
         const auto [column, b] = p.place(1, c);
         y[a][row] += v * x[b][column];
@@ -159,12 +159,12 @@ double EdgeBlocks::magnitude(const RodRange &rod, const Joins &of, const Planes 
       for (int c = r; c < 3; ++c)
         sum += std::pow((r == c ? 1 : 2) * entry(rod, vertex(r, c))[t.copy - rod.first_slot] * moved[r] * moved[c], 2);
   }
-  for (const EdgePair &p : of.touching)
-    for (int r = 0; r < EdgePair::variables; ++r)
-      for (int c = 0; c < EdgePair::variables; ++c) {
+  for (const TouchingPair &p : of.touching)
+    for (int r = 0; r < TouchingPair::variables; ++r)
+      for (int c = 0; c < TouchingPair::variables; ++c) {
         const auto [row, a] = p.place(0, r);
         const auto [column, b] = p.place(1, c);
-        sum += std::pow(2 * touching(p.number)[EdgePair::variables * r + c] * x[a][row] * x[b][column], 2);
+        sum += std::pow(2 * touching(p.number)[TouchingPair::variables * r + c] * x[a][row] * x[b][column], 2);
       }
   return std::sqrt(sum);
 }

@@ -11,15 +11,14 @@ void DofMap::makeIsland(RodSet a, RodSet b) {
   for (int r = island.begin; r < island.end; ++r) islands_[r] = island;
 }
 
-void DofMap::setTouching(std::vector<EdgePair> pairs) {
+void DofMap::setTouching(std::vector<TouchingPair> pairs) {
   touching_ = {};
   touching_.items = std::move(pairs);
-  for (std::size_t k = 0; k < touching_.items.size(); ++k) touching_.items[k].number = int(k);
   if (!touching_.items.empty()) touching_.sort(rods_.size());
   islands_ = lasting_;
   if (islands_.empty() && !touching_.items.empty())
     for (int r = 0; r < int(rods_.size()); ++r) islands_.push_back({r, r + 1});
-  for (const EdgePair &p : touching_.items)
+  for (const TouchingPair &p : touching_.items)
     if (p.to_rod != p.rod) makeIsland(islands_[p.to_rod], islands_[p.rod]);
 }
 

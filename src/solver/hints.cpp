@@ -1,6 +1,7 @@
 #include "tendril/solver/hints.hpp"
 
 #include "tendril/contact/contact.hpp"
+#include "tendril/contact/touching_bodies.hpp"
 #include "tendril/energy/constraint.hpp"
 #include "tendril/solver/imbalance.hpp"
 
@@ -72,7 +73,7 @@ std::string nearObstacle(const IncrementalPotential &potential, RodSet rods) {
 std::string nearRod(const IncrementalPotential &potential, RodSet rods) {
   const Scene &scene = potential.scene();
   std::ostringstream hint;
-  if (!potential.touchesRods()) return {};
+  if (!potential.touches()) return {};
   double within = HUGE_VAL; // a quarter of the barrier
   for (int r = rods.begin; r < rods.end; ++r)
     if (const ContactSettings &c = scene.rods[r].contact; c.touchesRods() && c.isBarrier())
@@ -83,6 +84,15 @@ std::string nearRod(const IncrementalPotential &potential, RodSet rods) {
     hint << std::setprecision(3) << "; rod '" << scene.rods[m.rod].name << "' at arc length " << m.arc
          << " m is pressed against " << (m.rod == m.to_rod ? "itself" : "rod '" + scene.rods[m.to_rod].name + "'")
          << " at " << m.to_arc << " m, the gap is " << m.gap << " m: shorter steps help against impacts";
+    break;
+  }
+  for (const BodyMeeting &m : tightestAmongBodies(scene, potential.elements(), potential.iterate())) {
+    const int rod = m.rod < 0 ? scene.bodies[m.other].rod : m.rod;
+    if (rod < rods.begin || rod >= rods.end || !(m.gap < m.wall + 0.25 * m.width)) continue;
+    hint << std::setprecision(3) << "; "
+         << (m.rod < 0 ? "body '" + scene.bodies[m.other].name : "rod '" + scene.rods[m.rod].name)
+         << "' is pressed against body '" << scene.bodies[m.body].name << "', the gap is " << m.gap
+         << " m: shorter steps help against impacts";
     break;
   }
   return hint.str();

@@ -18,7 +18,7 @@ IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, con
           std::any_of(terms_.begin(), terms_.end(), [](const auto &term) { return term->couplesPositions(); })),
       joins_positions_(
           std::any_of(terms_.begin(), terms_.end(), [](const auto &term) { return term->joinsPositions(); })),
-      touches_rods_(scene.touchesRods()), obstacles_move_(scene.collidersMove()),
+      touches_(scene.touchesMoving()), obstacles_move_(scene.collidersMove()),
       obstacles_held_(scene.rods.size(), false) {}
 
 void IncrementalPotential::beginStep(const State &start, const Step &step) {
@@ -56,12 +56,17 @@ void IncrementalPotential::findTouching(const State &start, double room) {
   for (int v = 0; v < elements_.vertices() && step_.rule; ++v)
     if (const int s = elements_.vertex_slot[v]; elements_.freedom()[s] != 0)
       way.setVector(0, s, step_.rule->guess.atVertex(v));
-  std::vector<EdgePair> pairs;
-  for (auto &term : terms_)
-    for (EdgePair &p : term->findTouching(start, start_, way, step_, room)) pairs.push_back(p);
+  if (step_.rule) setBodies(all(), way, [&](const JoinedBody &b) { return step_.rule->guess.ofBody(b.body); });
+  std::vector<TouchingPair> pairs;
+  for (auto &term : terms_) term->findTouching(start, start_, way, step_, room, pairs);
   dofs_.setTouching(std::move(pairs));
   derivatives_.blocks.setTouching(dofs_.touching().items.size());
   std::fill(known_.begin(), known_.end(), Known::nothing);
+}
+
+bool IncrementalPotential::nearlyTouch(const TouchingPair &pair) const {
+  return std::any_of(terms_.begin(), terms_.end(),
+                     [&](const std::unique_ptr<Term> &term) { return term->nearlyTouch(pair, iterate_); });
 }
 
 void IncrementalPotential::setLoadFactor(double factor) {
@@ -166,6 +171,10 @@ void IncrementalPotential::assemble(RodSet islands, HessianKind hessian) {
     assembleRod(r, hessian);
     known(r) = hessian == HessianKind::none ? Known::gradient : Known::all;
   }
+  for (const TouchingPair &p : dofs_.touching(islands))
+    if (hessian != HessianKind::none)
+      std::fill_n(derivatives_.blocks.touching(p.number), EdgeBlocks::touching_size, 0.0);
+  for (const auto &term : terms_) term->addBetween(iterate_, islands, derivatives_, hessian);
   for (const JoinedVertex &j : elements_.joinedVertices(islands)) { // forces turn with the arms that they act at
     if (!j.isOnBody() || hessian == HessianKind::none) continue;
     const JoinedBody &body = elements_.body(j.body);
@@ -175,10 +184,6 @@ void IncrementalPotential::assemble(RodSet islands, HessianKind hessian) {
       for (int b = a; b < 3; ++b)
         derivatives_.blocks.entry(rod, EdgeBlocks::vertex(a, b))[body.rotation - rod.first_slot] += more(a, b);
   }
-  for (const EdgePair &p : dofs_.touching(islands))
-    if (hessian != HessianKind::none)
-      std::fill_n(derivatives_.blocks.touching(p.number), EdgeBlocks::touching_size, 0.0);
-  for (const auto &term : terms_) term->addBetween(iterate_, islands, derivatives_, hessian);
   dofs_.foldJoined(islands, derivatives_.gradient);
   dofs_.foldJoined(islands, derivatives_.equilibrium);
 }

@@ -1,5 +1,4 @@
 /// How SNES and its parts are made, and what they call.
-#include "tendril/contact/touching_rods.hpp"
 #include "tendril/solver/newton.hpp"
 
 #include <petsc/private/linesearchimpl.h>
@@ -151,22 +150,21 @@ PetscErrorCode NewtonSolver::makeMatrix() {
   if (first) has.clear();
   if (touches_ && jacobian_.object()) {
     const EdgeBlocks &blocks = potential_->derivatives(rods_).blocks;
-    const Configuration &c = potential_->iterate();
     bool complete = !first;
     std::vector<int> near;
-    for (const EdgePair &p : potential_->dofs().touching(rods_)) {
+    for (const TouchingPair &p : potential_->dofs().touching(rods_)) {
       const double *const entries = blocks.touching(p.number);
-      const bool kept = std::binary_search(has.begin(), has.end(), p.number),
+      const int place = int(&p - potential_->dofs().touching().items.data());
+      const bool kept = std::binary_search(has.begin(), has.end(), place),
                  touches = std::any_of(entries, entries + EdgeBlocks::touching_size, [](double v) { return v != 0; });
       complete = complete && (kept || !touches);
-      if (kept || touches || nearlyTouch(potential_->scene(), p, TouchingRods::pointsOf(p, c)))
-        near.push_back(p.number);
+      if (kept || touches || potential_->nearlyTouch(p)) near.push_back(place);
     }
     if (complete) PetscFunctionReturn(0);
     has = std::move(near);
   }
   if (!before && has.empty() && jacobian_.object()) PetscFunctionReturn(0);
-  pattern_.turns = potential_->scene().slidesAmongRods();
+  pattern_.turns = potential_->scene().slidesAmongMoving();
   PetscCall(SNESGetKSP(snes_, &ksp));
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(KSPReset(ksp));

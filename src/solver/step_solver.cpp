@@ -35,7 +35,7 @@ std::vector<RodSet> StepSolver::wantedBlocks() const {
 /// Finds what may touch in the step that has begun, and makes solvers for the islands that it joins.
 PetscErrorCode StepSolver::findTouching(const State &start, double room) {
   PetscFunctionBeginUser;
-  if (!potential_->touchesRods()) PetscFunctionReturn(0);
+  if (!potential_->touches()) PetscFunctionReturn(0);
   DofMap &dofs = potential_->dofs();
   potential_->findTouching(start, room);
   const std::vector<RodSet> blocks = wantedBlocks();
@@ -79,7 +79,7 @@ constexpr double most_room = 1e4;
 PetscErrorCode StepSolver::solve(const State &start, const Step &step, NewtonReport *report, Seek seek,
                                  const Guess *guess) {
   PetscFunctionBeginUser;
-  if (potential_->touchesRods())
+  if (potential_->touches())
     PetscCall(begin(start, step));
   else
     potential_->beginStep(start, step); // blocks begin with their rods, while these are in the cache

@@ -90,7 +90,9 @@ bool NewtonSolver::isLittle(int r, double *size) {
   *size = sizeOf(r, work_->increment);
   constexpr double apart = 1e-8; // of exact joints, over the size of their bodies
   if (!potential_->elements().pairs({r, r + 1}).empty() && !(work_->residual[r].compatibility <= apart)) return false;
-  if ((potential_->scene().touches(r) || potential_->scene().rods[r].contact.touchesRods()) &&
+  const Scene &scene = potential_->scene();
+  const bool hosts = scene.touchesBodies() && !potential_->elements().bodies({r, r + 1}).empty();
+  if ((scene.touches(r) || scene.rods[r].contact.touchesMoving() || hosts) &&
       !(potential_->changeOfPressure(r, work_->increment) <= tolerance))
     return false;
   if (*size <= 256 * epsilon * std::max(1.0, energy.reach / potential_->length(r)))

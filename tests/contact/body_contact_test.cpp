@@ -1,6 +1,7 @@
 /// Rigid bodies against obstacles: rest, slide, tip, roll, and nothing passes through.
 #include "support/beams.hpp"
 #include "support/random_cell.hpp"
+#include "support/touching.hpp"
 #include "tendril/contact/body_samples.hpp"
 #include "tendril/contact/contact.hpp"
 #include "tendril/geometry/rotation.hpp"
@@ -10,22 +11,6 @@ namespace tendril::test {
 namespace {
 
 constexpr double earth = 9.81;
-
-Body shaped(const std::string &shape, const Vec3 &size, const Vec3 &at, const Mat3 &turn = Mat3::Identity()) {
-  Body body;
-  body.name = body.shape = shape;
-  body.size = size;
-  const MassProperties own = shape == "box"        ? boxMass(size, 1000)
-                             : shape == "sphere"   ? sphereMass(size[0], 1000)
-                             : shape == "cylinder" ? cylinderMass(size[0], size[1], 1000)
-                                                   : capsuleMass(size[0], size[1], 1000);
-  body.own = own.moved(turn, at);
-  body.position = at;
-  body.rotation = turn;
-  body.contact.on = true;
-  body.contact.distance = 0.02 * std::sqrt(own.inertia.trace() / own.mass);
-  return body;
-}
 
 Collider floor() {
   Collider floor;

@@ -2,31 +2,13 @@
 #include "support/differences.hpp"
 #include "support/option_set.hpp"
 #include "support/rods.hpp"
+#include "support/touching.hpp"
 #include "tendril/contact/contact.hpp"
 #include "tendril/contact/neighbours.hpp"
 #include "tendril/contact/segments.hpp"
 
 namespace tendril::test {
 namespace {
-
-ContactSettings amongRods(double radius, ContactSettings::Rods rods = ContactSettings::Rods::others) {
-  ContactSettings s;
-  s.radius = radius;
-  s.distance = 0.2 * radius;
-  s.rods = rods;
-  return s;
-}
-
-Rod wire(const std::string &name, const Vec3 &from, const Vec3 &to, int edges, double radius = 0.005,
-         double young = 1e7) {
-  Rod rod;
-  rod.name = name;
-  rod.position = lineShape(from, to, edges).points;
-  rod.material = homogeneousMaterial({SectionShape::circle, {radius, 0}}, young, young / 2.6, 1000);
-  rod.contact = amongRods(radius);
-  setBishopDirectors(rod);
-  return rod;
-}
 
 /// A string without bending stiffness, held at both ends.
 Rod taut(const std::string &name, const Vec3 &from, const Vec3 &to, int edges, double radius, double stiffness) {
@@ -99,7 +81,7 @@ TEST(Neighbours, AreFoundByTheGridAsByLookingAtAll) {
       room.way.push_back(0.01 * random.vector());
       room.beyond.push_back(0.01 * std::abs(random()));
     }
-    const std::vector<EdgePair> grid = neighbours.find(room), all = neighbours.findByAll(room);
+    const std::vector<TouchingPair> grid = neighbours.find(room), all = neighbours.findByAll(room);
     ASSERT_EQ(grid.size(), all.size());
     found += grid.size();
     for (std::size_t n = 0; n < all.size(); ++n) {
@@ -207,7 +189,8 @@ TEST(RodContact, LeavesMomentaAlone) {
   const std::unique_ptr<Term> contact = makeRodContact(sim.scene, *sim.elements);
   const Configuration c = configurationOf(sim.state, sim.scene, *sim.elements, 0);
   const Planes still = sim.dofs.makePlanes();
-  const std::vector<EdgePair> pairs = contact->findTouching(sim.state, c, still, {}, 1);
+  std::vector<TouchingPair> pairs;
+  contact->findTouching(sim.state, c, still, {}, 1, pairs);
   Derivatives d(sim.elements->slots, true);
   d.blocks.setTouching(pairs.size());
   contact->addBetween(c, {0, 4}, d, HessianKind::exact);
@@ -276,7 +259,8 @@ double errorOfCrossedStrings(double width) {
   EXPECT_NEAR(force, 36.5510260, 0.02 * 36.55); // that of hard contact
   const std::unique_ptr<Term> contact = makeRodContact(sim.scene, *sim.elements);
   const Configuration end = configurationOf(sim.state, sim.scene, *sim.elements, 1);
-  const auto pairs = contact->findTouching(sim.state, end, sim.dofs.makePlanes(), {}, 1);
+  std::vector<TouchingPair> pairs;
+  contact->findTouching(sim.state, end, sim.dofs.makePlanes(), {}, 1, pairs);
   Derivatives d(sim.elements->slots, true);
   d.blocks.setTouching(pairs.size());
   contact->addBetween(end, {0, 2}, d, HessianKind::none);
@@ -413,7 +397,8 @@ TEST(RodContact, FrictionMakesNoCouple) {
     const Configuration start = configurationOf(sim.state, sim.scene, *sim.elements, 0);
     Step step;
     step.dt = step.time = 0.01;
-    const auto pairs = contact->findTouching(sim.state, start, sim.dofs.makePlanes(), step, 1);
+    std::vector<TouchingPair> pairs;
+    contact->findTouching(sim.state, start, sim.dofs.makePlanes(), step, 1, pairs);
     for (int v = 10; v < 20; ++v) sim.state.position[std::size_t(v)] += Vec3(0.002, 0.001, off);
     const Configuration end = configurationOf(sim.state, sim.scene, *sim.elements, 0);
     Derivatives d(sim.elements->slots, true);

@@ -1,8 +1,8 @@
 #pragma once
 /// \file body_samples.hpp
-/// Samples of the surfaces of rigid bodies, where they touch obstacles.
+/// Surfaces of rigid bodies: samples of them, the solid within, and what presses on them.
 
-#include "tendril/model/body.hpp"
+#include "tendril/layout/elements.hpp"
 
 namespace tendril {
 
@@ -16,5 +16,12 @@ struct BodySample {
 /// of a cylinder, vertices and middles of the triangles of a mesh. Between them less than a quarter of the longest
 /// side, or of a rim a 48th; obstacles that are smaller may pass. \param centre of mass [m]
 std::vector<BodySample> surfaceSamples(const Body &body, const Vec3 &centre);
+/// In the axes of the body; null where it has no shape.
+std::shared_ptr<const Shape> solidOf(const Body &body);
+/// Loads on a body [N]: its weight, force, and couple over its size.
+double loadOn(const Scene &scene, const Elements &elements, int body);
+/// What a sample of its surface bears where surfaces touch [N]: what is given, or its loads, or a part of what stops it
+/// at its first velocity or that of an obstacle.
+double pressOn(const Scene &scene, const Elements &elements, int body);
 
 } // namespace tendril

@@ -8,6 +8,8 @@
 #include "tendril/energy/term.hpp"
 #include "tendril/geometry/rotation.hpp"
 
+#include <algorithm>
+
 namespace tendril {
 
 /// A sample that slides. Its point of the rod's surface is carried by the frame of its edge, which friction turns.
@@ -22,6 +24,8 @@ struct SlidingPoint {
   Vec3 stick = Vec3::Zero();   ///< drawn from its anchor when the step began, in the axes of the world [m]
   Vec3 held = Vec3::Zero();    ///< friction on the rod when the step began, in the axes of the world [N]
   Vec3 start = Vec3::Zero();   ///< from that point to the rod's when the step began, in the axes of the world [m]
+  SlidingPoint &slid() { return *this; }
+  bool isSame(const SlidingPoint &b) const { return slot == b.slot && point == b.point && collider == b.collider; }
 };
 
 /// What a sample remembers, or null. \param memory of its rod, in the order of keys
@@ -59,6 +63,42 @@ struct SlidingForce {
 /// reaches `pressing` at the fall-off.
 SlidingForce slidingForce(const SlidingPoint &point, const ContactSettings &settings, const Sliding &sliding,
                           const Vec3 &way);
+
+/// What friction and damping two have between them: the geometric means count.
+ContactSettings bothSlide(const ContactSettings &a, const ContactSettings &b);
+
+/// Takes points as they touch now in place of those before, both in one order. Where rounds swing, they are led to the
+/// middle. \param force_before that on a point of those before, now \return by which part that changes friction
+template <class Point, class Force, class ForceBefore>
+double renewSliding(std::vector<Point> &points, std::vector<Point> now, SlidingRounds &rounds, Force force_now,
+                    ForceBefore force_before) {
+  double change = 0, size = 0;
+  auto next = points.begin();
+  std::vector<double> pressed; // before, at the same points
+  for (Point &p : now) {
+    const Vec3 force = force_now(p).gradient;
+    const auto found = std::find_if(next, points.end(), [&](const Point &old) { return old.isSame(p); });
+    Vec3 before = Vec3::Zero();
+    pressed.push_back(0);
+    if (found != points.end()) {
+      before = force_before(*found).gradient;
+      pressed.back() = found->slid().pressing;
+      next = found + 1;
+    }
+    size += std::max(p.slid().coefficient * p.slid().pressing, force.norm());
+    change += (force - before).norm();
+  }
+  change = size > 0 ? change / size : 0;
+  rounds.add(change);
+  for (std::size_t k = 0; k < now.size() && rounds.swings; ++k)
+    now[k].slid().pressing = 0.5 * (now[k].slid().pressing + pressed[k]);
+  points = std::move(now);
+  return change;
+}
+template <class Point, class Force>
+double renewSliding(std::vector<Point> &points, std::vector<Point> now, SlidingRounds &rounds, Force force) {
+  return renewSliding(points, std::move(now), rounds, force, force);
+}
 
 /// The way of a point since the step began, relative to the obstacle.
 Vec3 wayOf(const SlidingPoint &point, const Configuration &c, const Collider::Pose &pose);

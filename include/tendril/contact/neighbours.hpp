@@ -23,9 +23,9 @@ public:
   /// Pairs of edges that may come within the reach of their law while vertices keep to their room, in the order of
   /// the rods and edges of the later one. Rods may have gone different parts of their ways. Found by a grid: the cost
   /// goes with the edges and with what is near.
-  std::vector<EdgePair> find(const Room &room) const;
+  std::vector<TouchingPair> find(const Room &room) const;
   /// The same by looking at all of them, for tests.
-  std::vector<EdgePair> findByAll(const Room &room) const;
+  std::vector<TouchingPair> findByAll(const Room &room) const;
   /// Whether two edges touch at all: neighbours along a rod do not, or rods would push themselves straight. Those are
   /// apart by less than half a turn of the rod around its own surface, along it and through what joins two rods.
   bool mayTouch(int rod, int edge, int to_rod, int to_edge) const;
@@ -50,7 +50,7 @@ private:
   double toArc(int rod, int edge, double arc) const;
   std::array<Vec3, 2> boxOf(const Room &room, int rod, int edge) const;
   bool isNear(const Room &room, int rod, int edge, int to_rod, int to_edge) const;
-  EdgePair pairOf(int rod, int edge, int to_rod, int to_edge) const;
+  TouchingPair pairOf(int rod, int edge, int to_rod, int to_edge) const;
   void addJoint(int rod, int vertex, int to_rod, int to_vertex);
 };
 
@@ -58,7 +58,7 @@ private:
 /// geometric mean of their stiffnesses.
 NormalLaw lawBetween(const ContactSettings &a, double stiffness_a, const ContactSettings &b, double stiffness_b);
 /// Whether two edges touch, or might after a motion by the width of their law.
-bool nearlyTouch(const Scene &scene, const EdgePair &pair, const std::array<Vec3, 4> &vertices);
+bool nearlyTouch(const Scene &scene, const TouchingPair &pair, const std::array<Vec3, 4> &vertices);
 /// Distance between the axes of two rods that no motion passes [m]: that of the barrier, or a fifth of their radii.
 double wallBetween(const ContactSettings &a, const ContactSettings &b);
 

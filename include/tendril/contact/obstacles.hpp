@@ -18,6 +18,17 @@ struct SamplePoint {
 /// keep `spacing`.
 std::vector<SamplePoint> samplePoints(int quadrature, double longest_edge, double spacing);
 
+/// That keeps what a rod feels of a surface the same wherever samples lie [m]: a tube of its radius against a surface
+/// that curves as much touches it along about twice this length.
+double sampleSpacing(const Shape &shape, const ContactSettings &contact);
+
+/// Part of the straight way of a point on which it stays beyond a wall about a shape, 1 where all of it does. It stops
+/// a fifth of the gap, or of a width, short of the wall. Conservative advancement (Li et al. 2021, Codimensional
+/// incremental potential contact, 4.2).
+/// \param from in the axes of the shape, as the way [m] \param radius about the point \param gap between surfaces there
+double freeWay(const Shape &shape, const Vec3 &from, const Vec3 &way, double radius, double gap, double wall,
+               double width);
+
 /// Some samples of one rod against one obstacle, with distances between surfaces [m].
 struct Samples {
   static constexpr int most = 128;

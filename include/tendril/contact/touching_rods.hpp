@@ -32,35 +32,36 @@ public:
   void find(const State &state, const Configuration &start, const Planes &way, const Step &step, double room);
   /// Finds what touches anew where a rod is not where it has been looked for.
   void cover(const Configuration &c, int rod) const;
-  const ByRod<EdgePair> &pairs() const { return pairs_; }
+  const ByRod<TouchingPair> &pairs() const { return pairs_; }
   /// Those that the matrix has to know of. Edges of one rod that the step is not expected to bring together are only
   /// watched: a rod that does not touch itself is solved as one that cannot.
-  std::vector<EdgePair> expected() const;
+  std::vector<TouchingPair> expected() const;
   /// Number of a pair among these, or -1 of one that is watched.
-  int expectedNumber(const EdgePair &p) const { return expected_[std::size_t(p.number)]; }
+  int expectedNumber(const TouchingPair &p) const { return expected_[std::size_t(p.number)]; }
   /// Takes note that a watched pair touches: the step has to be begun again, with all of them expected.
-  void note(const EdgePair &p) const { surprised_[std::size_t(p.rod)] = true; }
+  void note(const TouchingPair &p) const { surprised_[std::size_t(p.rod)] = true; }
   /// Those of a rod, which it has or another one.
   const std::vector<int> &pairsOf(int rod) const { return of_rod_[std::size_t(rod)]; }
 
   const ContactSettings &settings(int rod) const { return scene_.rods[std::size_t(rod)].contact; }
   const std::vector<double> &stiffness() const { return stiffness_; } ///< of barriers, per rod [N/m]
-  NormalLaw lawOf(const EdgePair &p) const { return lawOf(stiffness_, p); }
-  NormalLaw lawOf(const std::vector<double> &stiffness, const EdgePair &p) const {
+  NormalLaw lawOf(const TouchingPair &p) const { return lawOf(stiffness_, p); }
+  NormalLaw lawOf(const std::vector<double> &stiffness, const TouchingPair &p) const {
     return lawBetween(settings(p.rod), stiffness[std::size_t(p.rod)], settings(p.to_rod),
                       stiffness[std::size_t(p.to_rod)]);
   }
   /// The four vertices of a pair from the first [m].
-  static std::array<Vec3, 4> pointsOf(const EdgePair &p, const Configuration &c) {
+  static std::array<Vec3, 4> pointsOf(const TouchingPair &p, const Configuration &c) {
     std::array<Vec3, 4> x;
     for (std::size_t k = 0; k < 4; ++k) x[k] = c.displacements<double>(p.slot[k], c, p.slot[0]);
     return x;
   }
   /// Calls visit(sample) for those of a pair within reach, one edge after the other.
-  template <class Visit> void visit(const EdgePair &p, const std::array<Vec3, 4> &x, double reach, Visit visit) const;
+  template <class Visit>
+  void visit(const TouchingPair &p, const std::array<Vec3, 4> &x, double reach, Visit visit) const;
   /// Calls visit(pair, sample) for all that touch of those pairs that some rods have.
   template <class Visit> void visit(const Configuration &c, RodSet rods, Visit visit) const {
-    for (const EdgePair &p : pairs_.of(rods))
+    for (const TouchingPair &p : pairs_.of(rods))
       this->visit(p, pointsOf(p, c), lawOf(p).reach(), [&](const Touching &t) { visit(p, t); });
   }
 
@@ -80,19 +81,19 @@ private:
   mutable std::vector<char> surprised_; ///< per rod: whether a watched pair touches
   mutable std::vector<int> expected_;   ///< per pair
   mutable Room room_;
-  mutable ByRod<EdgePair> pairs_;
+  mutable ByRod<TouchingPair> pairs_;
   mutable std::vector<std::array<char, 2>> goes_on_; ///< per pair and side: whether the edge behind the other touches
   mutable std::vector<std::vector<int>> of_rod_;
 
-  double radiiOf(const EdgePair &p) const { return settings(p.rod).radius + settings(p.to_rod).radius; }
-  double widthOf(const EdgePair &p) const {
+  double radiiOf(const TouchingPair &p) const { return settings(p.rod).radius + settings(p.to_rod).radius; }
+  double widthOf(const TouchingPair &p) const {
     return settings(p.rod).isBarrier() ? 0.5 * (settings(p.rod).distance + settings(p.to_rod).distance)
                                        : 0.2 * radiiOf(p);
   }
-  double wallOf(const EdgePair &p) const;
+  double wallOf(const TouchingPair &p) const;
   void makeRoom(const Configuration &start, const Planes *way, double room) const;
   bool isInRoom(const Configuration &from, const Configuration &to, double part, int rod) const;
-  void take(std::vector<EdgePair> pairs) const;
+  void take(std::vector<TouchingPair> pairs) const;
   void expect(const Configuration &start, const Planes &way, bool all);
   void setStiffness(const State &state, const Configuration &start, const Planes &way, const Step &step);
   void bearAsDrawn(const Configuration &start, const std::vector<double> &load);
@@ -105,7 +106,7 @@ private:
 /// Samples are at both ends of an edge and between, a fraction of the thinner radius apart, so that where they lie does
 /// not matter (docs/theory.md). Those that are farther off than others between could come nearer are passed over.
 template <class Visit>
-void TouchingRods::visit(const EdgePair &p, const std::array<Vec3, 4> &x, double reach, Visit visit) const {
+void TouchingRods::visit(const TouchingPair &p, const std::array<Vec3, 4> &x, double reach, Visit visit) const {
   const double radii = radiiOf(p);
   if (farApart(x) > radii + reach) return;
   const double thinner = std::min(settings(p.rod).radius, settings(p.to_rod).radius),

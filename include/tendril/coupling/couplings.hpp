@@ -23,6 +23,8 @@ std::unique_ptr<Term> makeBodyContact(const Scene &, const Elements &);
 std::unique_ptr<Term> makeContact(const Scene &, const Elements &);
 /// That of rods with each other and themselves; null where they do not touch.
 std::unique_ptr<Term> makeRodContact(const Scene &, const Elements &);
+/// Of bodies with rods and with each other.
+std::unique_ptr<Term> makeContactOfBodies(const Scene &, const Elements &);
 
 /// The energies of a state, from the terms of its scene (for tests and single questions: makes them anew).
 EnergyBudget energyBudget(const Scene &scene, const Elements &elements, const State &state,

@@ -122,14 +122,17 @@ public:
   }
   /// Takes what it took from before for constant anew from the iterate. \return by which part that changes its forces
   virtual double renew(const Configuration & /*iterate*/, int /*rod*/) { return 0; }
-  /// Edges that may touch in a step, whose vertices go about so far from its start; sorted by the rod that has them.
-  /// \param room how much farther vertices may go than they are expected to, 1 where nothing else is known
-  virtual std::vector<EdgePair> findTouching(const State & /*state*/, const Configuration & /*start*/,
-                                             const Planes & /*way*/, const Step & /*step*/, double /*room*/) {
-    return {};
+  /// Adds pairs of edges and bodies that may touch in a step, in which these go about so far from its start; the number
+  /// of a pair is its place in the list.
+  /// \param way of vertices, and of bodies with their spins
+  /// \param room how much farther they may go than they are expected to, 1 where nothing else is known
+  virtual void findTouching(const State & /*state*/, const Configuration & /*start*/, const Planes & /*way*/,
+                            const Step & /*step*/, double /*room*/, std::vector<TouchingPair> & /*pairs*/) {}
+  /// Whether a pair that it has found touches, or might after a motion by the width of its law.
+  virtual bool nearlyTouch(const TouchingPair & /*pair*/, const Configuration & /*configuration*/) const {
+    return false;
   }
-  /// How often a trial of any of some rods has been kept from leaving the room in which all edges that may touch are
-  /// known.
+  /// How often a trial of any of some rods has been kept from leaving the room in which all that may touch is known.
   virtual int timesBounded(RodSet /*rods*/) const { return 0; }
   /// Adds derivatives of what acts between the rods of an island, to both of the gradients; those of each rod alone are
   /// there, and copies have been added to what they stand for.

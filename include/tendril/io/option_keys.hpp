@@ -127,7 +127,8 @@ inline constexpr Key option_keys[] = {
      "", "10", "output"},
     {"-output_fields", KeyType::text, "", "all", "fields of a frame besides the position, with commas", anything, "",
      "all,curvature", "output",
-     "all is director, velocity, twist_rate, axial_force, turns and those of bodies; what is not in the state is named, "
+     "all is director, velocity, twist_rate, axial_force, turns and those of bodies; what is not in the state is "
+     "named, "
      "e.g. all,force,moment"},
 };
 

@@ -12,6 +12,7 @@ namespace tendril {
   {block ".rods", KeyType::word, "", "none",                                                                           \
    "which other rods it touches, of those that touch it: none, others, or all, itself, too", anything,                 \
    "none|others|all", "all"},                                                                                          \
+  {block ".bodies", KeyType::flag, "", "false", "whether it touches bodies that touch rods", anything, "", "true"},     \
   {block ".law", KeyType::word, "", "barrier", "barrier: never gives way; penalty: a spring over the depth", anything, \
    "barrier|penalty", "penalty"},                                                                                      \
   {block ".radius", KeyType::number, "m", "(of the section)",                                                          \
@@ -157,8 +158,8 @@ inline constexpr Key scene_keys[] = {
      not_negative, "", "0.1"},
     {"rods[].material.stiffness_damping_coefficient", KeyType::number, "s", "0",
      "dissipation proportional to stiffness", not_negative, "", "1e-3"},
-    {"rods[].contact", KeyType::word_or_map, "", "(as the scene)", "how it touches obstacles and rods; none: not at all",
-     anything, "none", "none"},
+    {"rods[].contact", KeyType::word_or_map, "", "(as the scene)",
+     "how it touches obstacles and rods; none: not at all", anything, "none", "none"},
     TENDRIL_CONTACT_KEYS("rods[].contact"),
     {"supports", KeyType::list, "", "(none)", "what holds rods"},
     {"supports[].rod", KeyType::rod, "", "(the only one)", "which rod", anything, "", "all"},
@@ -302,13 +303,17 @@ inline constexpr Key scene_keys[] = {
      "[1, 0, 0]"},
     {"colliders[].motion.table", KeyType::rows, "s, m, rad", "(velocities)", "rows as those of supports", anything, "",
      "[[0, 0, 0, 0], [1, 0.1, 0, 0]]"},
-    {"contact", KeyType::map, "", "(defaults)", "how all rods touch obstacles and each other; each rod may have keys of its own"},
+    {"contact", KeyType::map, "", "(defaults)",
+     "how all rods touch obstacles, each other and bodies; each rod may have keys of its own"},
     TENDRIL_CONTACT_KEYS("contact"),
-    {"contact.ignore", KeyType::list, "", "(none)", "rods that pass through colliders as if they were not there"},
-    {"contact.ignore[].rods", KeyType::text, "", "required", "name or layer of the rods, or all", anything, "",
-     "strands"},
-    {"contact.ignore[].colliders", KeyType::text, "", "required", "name or layer of the colliders", anything, "",
-     "floor"},
+    {"contact.ignore", KeyType::list, "", "(none)",
+     "pairs that pass through each other: two of rods, to_rods, bodies, to_bodies and colliders"},
+    {"contact.ignore[].rods", KeyType::text, "", "(none)", "name or layer of rods, or all", anything, "", "strands"},
+    {"contact.ignore[].to_rods", KeyType::text, "", "(none)", "of rods that these pass through", anything, "", "all"},
+    {"contact.ignore[].bodies", KeyType::text, "", "(none)", "name or layer of bodies", anything, "", "bob"},
+    {"contact.ignore[].to_bodies", KeyType::text, "", "(none)", "of bodies that these pass through", anything, "",
+     "bob"},
+    {"contact.ignore[].colliders", KeyType::text, "", "(none)", "name or layer of colliders", anything, "", "floor"},
 };
 
 } // namespace tendril

@@ -49,11 +49,11 @@ public:
   std::span<const Tie> ties(RodSet rods) const { return ties_.of(rods); }
   std::span<const JoinedBody> bodies(RodSet rods) const { return bodies_.of(rods); }
   std::span<const BodyPair> pairs(RodSet rods) const { return pairs_.of(rods); }
-  /// Edges that may touch in the step, by the rod that has them.
-  std::span<const EdgePair> touching(RodSet rods) const { return touching_.of(rods); }
-  const ByRod<EdgePair> &touching() const { return touching_; }
-  /// Sets them, in the order of their rods, and makes islands of the rods that they belong to.
-  void setTouching(std::vector<EdgePair> pairs);
+  /// Edges and bodies that may touch in the step, by the rod that has the pair.
+  std::span<const TouchingPair> touching(RodSet rods) const { return touching_.of(rods); }
+  const ByRod<TouchingPair> &touching() const { return touching_; }
+  /// Sets them, each with a number of its own below their count, and makes islands of the rods that they belong to.
+  void setTouching(std::vector<TouchingPair> pairs);
   /// Whether a junction, a tie or contact meets any of some rods.
   bool isCoupled(RodSet rods) const { return isJoined(rods) || !touching(rods).empty(); }
   Joins joins(int rod) const {
@@ -93,7 +93,7 @@ public:
     std::vector<PetscInt> row, column;
     std::vector<std::ptrdiff_t> source;
     std::size_t lasting = 0;   ///< of these, all but those of edges that touch
-    std::vector<int> touching; ///< pairs of edges that it has entries of, in order, ...
+    std::vector<int> touching; ///< pairs that it has entries of, by their rising places in DofMap::touching(), ...
     bool turns = false;        ///< ... with their twists, which friction turns
     std::vector<double> entries;
     /// Components of arms that an entry is multiplied by, three times the number of the arm and the axis, or -1; empty
@@ -148,7 +148,7 @@ private:
   ByRod<BodyPair> pairs_;
   std::vector<Vec3> arms_; ///< of joined vertices
   int groups_ = 0;
-  ByRod<EdgePair> touching_;
+  ByRod<TouchingPair> touching_;
   std::vector<RodSet> islands_;  ///< per rod; empty where nothing joins any
   std::vector<RodSet> lasting_;  ///< the same without contact
   std::vector<char> joined_;     ///< per rod, as islands

@@ -51,14 +51,14 @@ public:
       : entries_(joins ? joined_entries : slot_entries), data_(std::size_t(entries_) * slots + 4 * lanes, 0.0) {}
   /// Makes room for so many pairs of edges that touch.
   void setTouching(std::size_t pairs) { touching_.assign(touching_size * pairs, 0.0); }
-  /// Entries of a pair, row by row: the variables of the edge by those of the other (EdgePair::place).
+  /// Entries of a pair, row by row: the variables of the edge by those of the other (TouchingPair::place).
   double *touching(int number) { return touching_.data() + std::size_t(touching_size) * number; }
   const double *touching(int number) const { return touching_.data() + std::size_t(touching_size) * number; }
   /// An entry by its place: in data(), or behind touching_place that of a pair.
   double at(std::ptrdiff_t place) const {
     return place < touching_place ? data_[std::size_t(place)] : touching_[std::size_t(place - touching_place)];
   }
-  static constexpr int touching_size = EdgePair::variables * EdgePair::variables;
+  static constexpr int touching_size = TouchingPair::variables * TouchingPair::variables;
   static constexpr std::ptrdiff_t touching_place = std::ptrdiff_t(1) << 48;
   bool joins() const { return entries_ == joined_entries; }
   int entries() const { return entries_; }

@@ -138,14 +138,23 @@ struct Tie {
   bool isToBody() const { return vertex < 0; }
 };
 
-/// Edges of two rods, or of one, that may touch each other in a step; `rod` is the later one of both.
-struct EdgePair {
-  int rod, edge, to_rod, to_edge;
-  std::array<int, 4> slot; ///< of the vertices of the edge, then of the other
+/// Two edges that may touch each other in a step, of two rods or of one, an edge and a body, or two bodies; `rod` is
+/// the later of the rods that have them.
+struct TouchingPair {
+  int rod, edge, to_rod, to_edge; ///< in place of its edge a body has its number, by ofBody
+  std::array<int, 4> slot; ///< of the vertices of an edge, or of a body's position and rotation; then of the other
   int number = -1;         ///< over all pairs: of the block that they have between them (EdgeBlocks::touching)
-  /// Of each edge x, y, z of its first vertex, those of its second, and its twist.
+  static constexpr int ofBody(int body) { return -1 - body; }
+  /// \param side 0 the one, 1 the other
+  bool isBody(int side) const { return (side == 0 ? edge : to_edge) < 0; }
+  int body(int side) const { return -1 - (side == 0 ? edge : to_edge); }
+  int rodOf(int side) const { return side == 0 ? rod : to_rod; }
+  int edgeOf(int side) const { return side == 0 ? edge : to_edge; }
+  bool isOfRods() const { return edge >= 0 && to_edge >= 0; }
+  bool isOfBodies() const { return edge < 0 && to_edge < 0; }
+  /// Of an edge x, y, z of its first vertex, those of its second, and its twist; of a body its displacement and spin.
   static constexpr int variables = 7;
-  /// Where a variable stands: its slot and the component there. \param side 0 the edge, 1 the other
+  /// Where a variable stands: its slot and the component there. \param side 0 the one, 1 the other
   std::pair<int, int> place(int side, int variable) const {
     if (variable == 6) return {slot[std::size_t(2 * side)], 3};
     return {slot[std::size_t(2 * side + variable / 3)], variable % 3};
@@ -158,7 +167,7 @@ struct Joins {
   std::span<const Tie> ties;
   std::span<const JoinedBody> bodies;
   std::span<const BodyPair> pairs;
-  std::span<const EdgePair> touching;
+  std::span<const TouchingPair> touching;
 };
 
 /// Unknowns of a slot: x, y, z, twist.

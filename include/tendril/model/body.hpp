@@ -24,7 +24,7 @@ struct MassProperties {
 
 /// A rigid body as drawn. Its axes are those of the world at the start, turned by `rotation` before.
 struct Body {
-  std::string name;
+  std::string name, layer;
   MassProperties own; ///< where it is drawn; vertices of rods that are tied to it come on top (Elements::bodyMass)
   Vec3 position = Vec3::Zero();         ///< of its origin [m]
   Mat3 rotation = Mat3::Identity();     ///< from its own axes to those of the world
@@ -36,8 +36,9 @@ struct Body {
   std::string shape = "none"; ///< box, sphere, capsule, cylinder, mesh or none
   Vec3 size = Vec3::Zero();   ///< of a box its edges; else radius, length along z
   std::shared_ptr<const TriangleMesh> mesh;
-  /// With obstacles: `on`, a barrier of `distance` and a force of `stiffness` at each sample of its surface [N] (0: by
-  /// the loads), friction and damping.
+  std::shared_ptr<const Shape> solid; ///< of that shape in its own axes, where rods or bodies touch it; else null
+  /// With obstacles, rods and other bodies: `on`, a barrier of `distance` and a force of `stiffness` at each sample of
+  /// its surface [N] (0: by the loads), friction and damping.
   ContactSettings contact = ContactSettings::none();
   Motion motion; ///< of one that goes as it is told, about its origin
   int rod = 0;   ///< the first that is tied to it, or any: they are solved together (Scene::hostBodies)

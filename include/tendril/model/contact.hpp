@@ -5,6 +5,7 @@
 #include "tendril/geometry/mesh_distance.hpp"
 #include "tendril/model/motion.hpp"
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -20,6 +21,8 @@ struct ContactSettings {
   /// Which rods it touches, of those that say the same of it.
   enum class Rods { none, others, all };
   Rods rods = Rods::none;
+  /// Whether it touches bodies, of those that say the same.
+  bool bodies = false;
   Law law = Law::barrier;
   double radius = 0;   ///< of the rod [m]
   double distance = 0; ///< width of the barrier [m]
@@ -38,7 +41,10 @@ struct ContactSettings {
   enum class Stick { by_mode, creep, anchored };
   Stick stick = Stick::by_mode;
   std::vector<int> passes; ///< obstacles that are not there for it
-  int quadrature = 0;      ///< Gauss points of an edge; 0: vertices, and points between where obstacles curve
+  /// Rods and bodies that are not there for each other: those of which one has a bit of `apart_from` that the other has
+  /// of `apart_to`.
+  std::uint64_t apart_from = 0, apart_to = 0;
+  int quadrature = 0; ///< Gauss points of an edge; 0: vertices, and points between where obstacles curve
 
   static ContactSettings none() {
     ContactSettings settings;
@@ -46,6 +52,12 @@ struct ContactSettings {
     return settings;
   }
   bool touchesRods() const { return on && rods != Rods::none; }
+  bool touchesBodies() const { return on && bodies; }
+  /// Whether it touches anything that moves by what it does to it.
+  bool touchesMoving() const { return touchesRods() || touchesBodies(); }
+  bool isApartFrom(const ContactSettings &other) const {
+    return ((apart_from & other.apart_to) | (apart_to & other.apart_from)) != 0;
+  }
   bool isBarrier() const { return law == Law::barrier; }
   /// Distance from the surface of a shape that no motion passes [m]: of a penalty, short of where the axis of the rod,
   /// or without a radius the middle of the obstacle, would be passed.

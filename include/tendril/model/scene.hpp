@@ -176,15 +176,28 @@ struct Scene {
   bool collidersMove() const;
   /// The latest time up to another, later one until which all obstacles move evenly (Motion::evenUntil).
   double collidersEvenUntil(double from, double to) const;
-  bool touchesBody(int body) const { return !colliders.empty() && bodies[body].contact.on; }
+  /// Whether a body may touch obstacles, rods or other bodies.
+  bool touchesBody(int body) const {
+    const ContactSettings &contact = bodies[body].contact;
+    return contact.on && (!colliders.empty() || contact.bodies);
+  }
   /// Whether any rod touches others or itself.
   bool touchesRods() const {
     return std::any_of(rods.begin(), rods.end(), [](const Rod &r) { return r.contact.touchesRods(); });
   }
-  /// Whether friction or damping acts between any.
-  bool slidesAmongRods() const {
-    return std::any_of(rods.begin(), rods.end(),
-                       [](const Rod &r) { return r.contact.touchesRods() && r.contact.slides(); });
+  /// Whether any body touches rods or other bodies.
+  bool touchesBodies() const {
+    const auto touches = [](const auto &of) { return of.contact.touchesBodies(); };
+    const auto count = std::count_if(bodies.begin(), bodies.end(), touches);
+    return count > 1 || (count == 1 && std::any_of(rods.begin(), rods.end(), touches));
+  }
+  /// Whether anything touches what moves by what it does to it.
+  bool touchesMoving() const { return touchesRods() || touchesBodies(); }
+  /// Whether friction or damping acts between any of these.
+  bool slidesAmongMoving() const {
+    const auto slides = [](const auto &of) { return of.contact.touchesMoving() && of.contact.slides(); };
+    return touchesMoving() &&
+           (std::any_of(rods.begin(), rods.end(), slides) || std::any_of(bodies.begin(), bodies.end(), slides));
   }
   /// Whether a rod may touch obstacles.
   bool touches(int rod) const { return !colliders.empty() && rods[rod].contact.on; }

@@ -41,10 +41,12 @@ public:
   /// state with supports' frames (not yet their positions) moved to the end of the step.
   void beginStep(const State &start, const Step &step);
   void beginRod(const State &start, int rod);
-  /// Whether rods touch each other or themselves. Then findTouching has to find what may touch in a step after it has
+  /// Whether rods and bodies touch each other. Then findTouching has to find what may touch in a step after it has
   /// begun with all of its rods, which makes islands of them.
-  bool touchesRods() const { return touches_rods_; }
+  bool touches() const { return touches_; }
   void findTouching(const State &start, double room);
+  /// See Term::nearlyTouch, at the iterate.
+  bool nearlyTouch(const TouchingPair &pair) const;
   /// See Term::timesBounded.
   int timesBounded(RodSet rods) const {
     int times = 0;
@@ -272,7 +274,7 @@ private:
   Known &known(int rod) { return known_[dofs_.islandOf(rod).begin]; }
   std::vector<RodScale> scales_;
 
-  bool dynamic_, couples_positions_, joins_positions_, touches_rods_;
+  bool dynamic_, couples_positions_, joins_positions_, touches_;
   bool obstacles_move_;
   std::vector<char> obstacles_held_; ///< per rod
 

@@ -1,0 +1,42 @@
+#pragma once
+/// \file pair_derivatives.hpp
+/// Derivatives of what two edges, an edge and a body, or two bodies do to each other.
+
+#include "tendril/energy/term.hpp"
+
+namespace tendril {
+
+/// Over the variables of a pair (TouchingPair::place), those of the one first.
+struct OfPair {
+  static constexpr int half = TouchingPair::variables, size = 2 * half;
+  /// A vector by the variables of one of both.
+  using BySide = Eigen::Matrix<double, 3, half>;
+  Eigen::Matrix<double, size, 1> gradient = Eigen::Matrix<double, size, 1>::Zero();
+  Eigen::Matrix<double, size, size> hessian = Eigen::Matrix<double, size, size>::Zero();
+  /// Where the position of one of the four vertices of two edges begins.
+  static int vertex(int k) { return half * (k / 2) + 3 * (k % 2); }
+};
+
+/// A point that the frame of an edge or of a body carries.
+struct CarriedPoint {
+  double at; ///< part of the edge
+  Vec3 arm;  ///< from there along tangent and both directors, or from the centre of mass as drawn [m]
+};
+/// Derivatives of such a point by the variables of its side.
+OfPair::BySide byPoint(const TouchingPair &pair, int side, const CarriedPoint &point, const Configuration &c);
+/// Adds the second derivatives of g.y, with the point y, by the variables of its side.
+void addCurvature(const TouchingPair &pair, int side, const CarriedPoint &point, const Vec3 &g, const Configuration &c,
+                  OfPair &out);
+/// Where the frame of an edge or body has taken its part of the point: arm in the axes of the world [m].
+Vec3 armOf(const TouchingPair &pair, int side, const CarriedPoint &point, const Configuration &c);
+/// From the second point to the first, relative to what was so before.
+Vec3 wayBetween(const TouchingPair &pair, int side, const CarriedPoint &own, const CarriedPoint &other,
+                const Configuration &c);
+
+/// Adds derivatives of a pair to both of the gradients and to the blocks: what each side has with itself goes to its
+/// own rod, of an edge by its first vertex, its vector and its twist, of a body to BodyPair; the rest to the block of
+/// the pair. \param number of the pair, or -1 where it has no block
+void addPair(const Elements &elements, const TouchingPair &pair, int number, const OfPair &d, HessianKind kind,
+             Derivatives &out);
+
+} // namespace tendril

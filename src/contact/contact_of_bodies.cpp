@@ -1,0 +1,256 @@
+/// Contact of rigid bodies with rods and with each other: samples of the ones against the others as solids, with
+/// friction at their surfaces (docs/theory.md, Contact between rods).
+#include "tendril/contact/friction.hpp"
+#include "tendril/contact/touching_bodies.hpp"
+#include "tendril/coupling/couplings.hpp"
+#include "tendril/state/spin_stage.hpp"
+
+#include <algorithm>
+
+namespace tendril {
+namespace {
+
+/// A sample that slides along a body. The point where surfaces touch is carried by both.
+struct SlidingSample {
+  TouchingPair pair;
+  int side, sample;
+  CarriedPoint own, other;
+  SlidingPoint point;
+  SlidingPoint &slid() { return point; }
+  bool isSame(const SlidingSample &b) const {
+    return pair.number == b.pair.number && side == b.side && sample == b.sample;
+  }
+};
+
+class ContactOfBodies final : public Term {
+public:
+  ContactOfBodies(const Scene &scene, const Elements &elements)
+      : scene_(scene), elements_(elements), bodies_(scene, elements), sliding_(scene.rods.size()),
+        slides_(scene.slidesAmongMoving()) {}
+
+  void findTouching(const State &state, const Configuration &start, const Planes &way, const Step &step, double room,
+                    std::vector<TouchingPair> &pairs) override {
+    bodies_.find(start, way, step, room);
+    first_number_ = int(pairs.size());
+    for (TouchingPair p : bodies_.pairs().items) {
+      p.number += first_number_;
+      pairs.push_back(p);
+    }
+    start_ = &start;
+    time_ = step.isStatic() ? 0 : step.time > state.time ? step.time - state.time : step.dt;
+    for (int r = 0; r < int(sliding_.size()) && slides_; ++r) {
+      OfSliding &s = sliding_[std::size_t(r)];
+      s = {};
+      if (time_ > 0) s.points = slidingSamples(start, r);
+    }
+  }
+  bool nearlyTouch(const TouchingPair &pair, const Configuration &c) const override {
+    if (pair.isOfRods()) return false;
+    TouchingPair own = pair;
+    own.number -= first_number_;
+    bool near = false;
+    bodies_.visit(own, c, 3 * bodies_.lawOf(own).reach(), [&](const TouchingSolid &) { near = true; });
+    return near;
+  }
+  int timesBounded(RodSet rods) const override {
+    int most = 0;
+    for (int r = rods.begin; r < rods.end; ++r) most = std::max(most, bodies_.timesBounded(r));
+    return most;
+  }
+  bool couplesPositions() const override { return true; }
+  bool joinsPositions() const override { return true; }
+  bool roundsAsStrains() const override { return false; }
+
+  double energy(const Configuration &c, int r) const override {
+    double sum = normalEnergy(c, r);
+    for (const SlidingSample &p : sliding_[std::size_t(r)].points) sum += forceOn(p, c).value;
+    return sum;
+  }
+  double noise(const Configuration &c, int r, double) const override {
+    double sum = 0;
+    bodies_.visit(c, {r, r + 1}, [&](const TouchingPair &p, const TouchingSolid &t) {
+      sum += std::abs(t.weight * bodies_.lawOf(p)(t.gap).slope) * 4 * epsilon * c.positionAt(p.slot[0]).norm();
+    });
+    return sum;
+  }
+  void addEnergies(const State &, const Configuration &c, double, int r, EnergyBudget &out) const override {
+    bodies_.cover(c, r);
+    out.contact += normalEnergy(c, r);
+  }
+  double smallestGap(const Configuration &c, int r) const override {
+    bodies_.cover(c, r);
+    return bodies_.smallestGap(c, r);
+  }
+  double freeFraction(const Configuration &from, const Configuration &to, int r) const override {
+    return bodies_.freeFraction(from, to, r);
+  }
+
+  void addDerivatives(const Configuration &, int, Derivatives &, HessianKind) const override {} // none is of one alone
+  void addBetween(const Configuration &c, RodSet island, Derivatives &out, HessianKind kind) const override {
+    for (int r = island.begin; r < island.end; ++r) {
+      auto sliding = sliding_[std::size_t(r)].points.begin();
+      const auto end = sliding_[std::size_t(r)].points.end();
+      for (const TouchingPair &p : bodies_.pairs().of({r, r + 1})) {
+        OfPair d;
+        bool any = false;
+        bodies_.visit(p, c, bodies_.lawOf(p).reach(), [&](const TouchingSolid &t) {
+          any = true;
+          addNormal(p, t, c, kind, d);
+        });
+        for (; sliding != end && sliding->pair.number == p.number; ++sliding) { // both lists are in one order
+          any = true;
+          addFriction(*sliding, c, kind, d);
+        }
+        if (any) addPair(elements_, p, first_number_ + p.number, d, kind, out);
+      }
+    }
+  }
+
+  std::array<double, 2> pressure(const Configuration &c, const Planes &increment, int r) const override {
+    std::array<double, 2> sum{0, 0};
+    for (const int k : bodies_.pairsOf(r)) {
+      const TouchingPair &p = bodies_.pairs().items[std::size_t(k)];
+      bodies_.visit(p, c, bodies_.lawOf(p).reach(), [&](const TouchingSolid &t) {
+        const GapLaw law = bodies_.lawOf(p)(t.gap);
+        const Collider::Pose pose = bodies_.poseOf(p.body(t.solid()), c);
+        const Vec3 normal = pose.rotation * bodies_.solidOf(p.body(t.solid())).at(t.local).gradient;
+        double closing = 0;
+        for (const int side : {0, 1}) {
+          const OfPair::BySide by = bySide(p, t, side, c);
+          for (int v = 0; v < (p.isBody(side) ? 6 : OfPair::half); ++v) {
+            const auto [slot, a] = p.place(side, v);
+            closing += normal.dot(by.col(v)) * increment[a][slot];
+          }
+        }
+        sum[0] += std::abs(t.weight * law.slope);
+        sum[1] += std::abs(t.weight * law.curvature * closing);
+      });
+    }
+    return sum;
+  }
+
+  double renew(const Configuration &iterate, int r) override {
+    if (!slides_ || time_ == 0) return 0;
+    OfSliding &s = sliding_[std::size_t(r)];
+    return renewSliding(s.points, slidingSamples(iterate, r), s.rounds,
+                        [&](const SlidingSample &p) { return forceOn(p, iterate); });
+  }
+
+private:
+  struct OfSliding {
+    std::vector<SlidingSample> points;
+    SlidingRounds rounds;
+  };
+  const Scene &scene_;
+  const Elements &elements_;
+  TouchingBodies bodies_;
+  std::vector<OfSliding> sliding_; ///< by the rods that have the pairs
+  const bool slides_;
+  const Configuration *start_ = nullptr;
+  double time_ = 0; ///< that the step takes; 0 in statics [s]
+  int first_number_ = 0;
+
+  double normalEnergy(const Configuration &c, int r) const {
+    double sum = 0;
+    bodies_.visit(c, {r, r + 1}, [&](const TouchingPair &p, const TouchingSolid &t) {
+      sum += t.weight * bodies_.lawOf(p)(t.gap).value;
+    });
+    return sum;
+  }
+
+  /// From the centre of mass of the solid to a sample [m].
+  Vec3 armTo(const TouchingPair &p, const TouchingSolid &t, const Configuration &c) const {
+    const Collider::Pose pose = bodies_.poseOf(p.body(t.solid()), c);
+    return pose.fromLocal(t.local) - c.positionAt(p.slot[std::size_t(2 * t.solid())]);
+  }
+  /// What the sample's place as the solid sees it, exp(-d)(x - p), changes by the variables of one of both.
+  OfPair::BySide bySide(const TouchingPair &p, const TouchingSolid &t, int side, const Configuration &c) const {
+    if (side == t.side) return byPoint(p, side, bodies_.pointOf(p, t), c);
+    OfPair::BySide by;
+    by << -Mat3::Identity(), crossMatrix<double>(armTo(p, t, c)), Vec3::Zero();
+    return by;
+  }
+
+  /// Derivatives of weight W(distance) of u = exp(-d)(x - p), the place of the sample as the solid sees it, which turns
+  /// by d about p: of second order g.u has what x does, that of the arm x - p, and -d x (dx - dp).
+  void addNormal(const TouchingPair &p, const TouchingSolid &t, const Configuration &c, HessianKind kind,
+                 OfPair &d) const {
+    const int own = OfPair::half * t.side, other = OfPair::half * t.solid();
+    const Mat3 q = bodies_.poseOf(p.body(t.solid()), c).rotation;
+    const Distance distance = bodies_.solidOf(p.body(t.solid())).at(t.local);
+    const GapLaw law = bodies_.lawOf(p)(t.gap);
+    const Vec3 normal = q * distance.gradient, g = t.weight * law.slope * normal;
+    Eigen::Matrix<double, 3, OfPair::size> by;
+    by << bySide(p, t, 0, c), bySide(p, t, 1, c);
+    d.gradient += by.transpose() * g;
+    if (kind == HessianKind::none) return;
+    Mat3 h = t.weight * law.curvature * normal * normal.transpose();
+    const bool exact = kind != HessianKind::gauss_newton;
+    if (exact) h += t.weight * law.slope * (q * distance.hessian * q.transpose());
+    d.hessian += by.transpose() * h * by;
+    if (!exact) return;
+    addCurvature(p, t.side, bodies_.pointOf(p, t), g, c, d);
+    d.hessian.block<3, 3>(other + 3, other + 3) += curvatureOfArm(g, armTo(p, t, c));
+    Eigen::Matrix<double, 3, OfPair::size> moved = Eigen::Matrix<double, 3, OfPair::size>::Zero(); // dx - dp
+    moved.middleCols<OfPair::half>(own) = by.middleCols<OfPair::half>(own);
+    moved.middleCols<3>(other) = -Mat3::Identity();
+    const Eigen::Matrix<double, OfPair::size, 3> turned = -moved.transpose() * crossMatrix<double>(g);
+    d.hessian.middleCols<3>(other + 3) += turned;
+    d.hessian.middleRows<3>(other + 3) += turned.transpose();
+  }
+
+  void addFriction(const SlidingSample &p, const Configuration &c, HessianKind kind, OfPair &d) const {
+    const SlidingForce force = forceOn(p, c);
+    Eigen::Matrix<double, 3, OfPair::size> by;
+    for (const int side : {0, 1}) {
+      const bool own = side == p.side;
+      by.middleCols<OfPair::half>(OfPair::half * side) =
+          (own ? 1 : -1) * byPoint(p.pair, side, own ? p.own : p.other, c);
+      if (kind != HessianKind::none)
+        addCurvature(p.pair, side, own ? p.own : p.other, (own ? 1 : -1) * force.gradient, c, d);
+    }
+    d.gradient += by.transpose() * force.gradient;
+    if (kind != HessianKind::none) d.hessian += by.transpose() * force.hessian * by;
+  }
+
+  SlidingForce forceOn(const SlidingSample &p, const Configuration &c) const {
+    const ContactSettings both = bothSlide(bodies_.settingsOf(p.pair, 0), bodies_.settingsOf(p.pair, 1));
+    return slidingForce(p.point, both, {both.fall_off_velocity * time_, time_},
+                        wayBetween(p.pair, p.side, p.own, p.other, c) - p.point.start);
+  }
+
+  /// What touches at a configuration. The point is in the middle between both surfaces, or on the axis of a rod whose
+  /// friction acts there.
+  std::vector<SlidingSample> slidingSamples(const Configuration &c, int r) const {
+    std::vector<SlidingSample> points;
+    bodies_.visit(c, {r, r + 1}, [&](const TouchingPair &pair, const TouchingSolid &t) {
+      const double pressing = -t.weight * bodies_.lawOf(pair)(t.gap).slope;
+      if (!(pressing > 0)) return;
+      const int solid = pair.body(t.solid());
+      const Collider::Pose pose = bodies_.poseOf(solid, c);
+      const Vec3 steep = pose.rotation * bodies_.solidOf(solid).at(t.local).gradient, normal = steep.normalized();
+      SlidingSample p{pair, t.side, t.sample, bodies_.pointOf(pair, t), {}, {}};
+      const bool on_axis = !pair.isBody(t.side) && (!bodies_.settingsOf(pair, t.side).friction_at_surface ||
+                                                    scene_.rods[std::size_t(pair.rodOf(t.side))].material.isCable());
+      const double out = on_axis ? 0 : t.radius + 0.5 * t.gap;
+      const std::size_t first = std::size_t(2 * t.side), to = std::size_t(2 * t.solid());
+      const int frame = pair.isBody(t.side) ? pair.slot[first + 1] : pair.slot[first];
+      p.own.arm -= out * (matrixOf(c.frameAt(frame)).transpose() * normal);
+      p.other.arm = matrixOf(c.frameAt(pair.slot[to + 1])).transpose() * (armTo(pair, t, c) - out * normal);
+      p.point.pressing = pressing * steep.norm();
+      p.point.coefficient = bothSlide(bodies_.settingsOf(pair, 0), bodies_.settingsOf(pair, 1)).friction;
+      p.point.normal = normal;
+      p.point.start = wayBetween(pair, t.side, p.own, p.other, *start_);
+      points.push_back(p);
+    });
+    return points;
+  }
+};
+
+} // namespace
+
+std::unique_ptr<Term> makeContactOfBodies(const Scene &scene, const Elements &elements) {
+  return scene.touchesBodies() ? std::make_unique<ContactOfBodies>(scene, elements) : nullptr;
+}
+
+} // namespace tendril

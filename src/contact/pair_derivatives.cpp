@@ -1,0 +1,105 @@
+#include "tendril/contact/pair_derivatives.hpp"
+
+#include "tendril/energy/constraint.hpp"
+#include "tendril/state/spin_stage.hpp"
+
+namespace tendril {
+namespace {
+
+constexpr int half = OfPair::half;
+
+void addEdge(const RodRange &rod, int i, int at, const OfPair &d, EdgeBlocks &blocks) {
+  const Mat3 second = d.hessian.block<3, 3>(at + 3, at + 3), between = d.hessian.block<3, 3>(at, at + 3),
+             whole = d.hessian.block<3, 3>(at, at) + between + between.transpose() + second;
+  Eigen::Matrix<double, 3, 4> joined;
+  joined << between + second, d.hessian.block<3, 1>(at, at + 6) + d.hessian.block<3, 1>(at + 3, at + 6);
+  for (int a = 0; a < 3; ++a) {
+    for (int b = a; b < 3; ++b) blocks.entry(rod, EdgeBlocks::vertex(a, b))[i] += whole(a, b);
+    for (int b = 0; b < edge_size; ++b) blocks.entry(rod, EdgeBlocks::joined(a, b))[i] += joined(a, b);
+  }
+  for (int a = 0; a < edge_size; ++a)
+    for (int b = a; b < edge_size; ++b)
+      blocks.entry(rod, EdgeBlocks::own(a, b))[i] += d.hessian(at + 3 + a, at + 3 + b);
+}
+
+void addBody(const RodRange &rod, const BodyPair &pair, int at, const OfPair &d, EdgeBlocks &blocks) {
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j) {
+      const auto [plane, slot] = EdgeBlocks::pair(i, j);
+      blocks.entry(rod, plane)[pair.first + slot - rod.first_slot] += d.hessian(at + i, at + j);
+    }
+}
+
+} // namespace
+
+Vec3 armOf(const TouchingPair &p, int side, const CarriedPoint &point, const Configuration &c) {
+  const std::size_t first = std::size_t(2 * side);
+  return matrixOf(c.frameAt(p.isBody(side) ? p.slot[first + 1] : p.slot[first])) * point.arm;
+}
+
+Vec3 wayBetween(const TouchingPair &p, int side, const CarriedPoint &own, const CarriedPoint &other,
+                const Configuration &c) {
+  const std::size_t first = std::size_t(2 * side), to = 2 - first;
+  Vec3 way =
+      c.displacements<double>(p.slot[first], c, p.slot[to]) + armOf(p, side, own, c) - armOf(p, 1 - side, other, c);
+  if (!p.isBody(side)) way += own.at * c.displacements<double>(p.slot[first + 1], c, p.slot[first]);
+  if (!p.isBody(1 - side)) way -= other.at * c.displacements<double>(p.slot[to + 1], c, p.slot[to]);
+  return way;
+}
+
+/// An edge has y = x + s e + o with the arm o turned by its spin, a body y = p + o.
+OfPair::BySide byPoint(const TouchingPair &p, int side, const CarriedPoint &point, const Configuration &c) {
+  const Vec3 arm = armOf(p, side, point, c);
+  OfPair::BySide by;
+  if (p.isBody(side)) {
+    by << Mat3::Identity(), -crossMatrix<double>(arm), Vec3::Zero();
+    return by;
+  }
+  const Frame frame = c.frameAt(p.slot[std::size_t(2 * side)]);
+  Eigen::Matrix<double, 3, 4> spin; // of the edge, by its vector and twist
+  spin << crossMatrix(frame.tangent) / frame.length, frame.tangent;
+  const Eigen::Matrix<double, 3, 4> turned = -crossMatrix(arm) * spin;
+  const Mat3 by_edge = point.at * Mat3::Identity() + turned.leftCols<3>();
+  by << Mat3::Identity() - by_edge, by_edge, turned.col(3);
+  return by;
+}
+
+void addCurvature(const TouchingPair &p, int side, const CarriedPoint &point, const Vec3 &g, const Configuration &c,
+                  OfPair &out) {
+  if (point.arm.isZero(0)) return;
+  const Vec3 arm = armOf(p, side, point, c);
+  const int first = half * side;
+  const Mat3 by_spin = curvatureOfArm(g, arm);
+  if (p.isBody(side)) {
+    out.hessian.block<3, 3>(first + 3, first + 3) += by_spin;
+    return;
+  }
+  const EdgeDerivatives bent = overEdge(c.frameAt(p.slot[std::size_t(2 * side)]), {arm.cross(g), by_spin}, true);
+  Eigen::Matrix<double, 4, half> edge; // its variables by those of its vertices
+  edge << -Mat3::Identity(), Mat3::Identity(), Vec3::Zero(), Eigen::Matrix<double, 1, 6>::Zero(), 1;
+  out.hessian.block<half, half>(first, first) += edge.transpose() * bent.hessian * edge;
+}
+
+void addPair(const Elements &elements, const TouchingPair &p, int number, const OfPair &d, HessianKind kind,
+             Derivatives &out) {
+  for (const int side : {0, 1})
+    for (int k = 0; k < (p.isBody(side) ? 6 : half); ++k) {
+      const auto [slot, a] = p.place(side, k);
+      out.gradient[a][slot] += d.gradient[half * side + k];
+      out.equilibrium[a][slot] += d.gradient[half * side + k];
+    }
+  if (kind == HessianKind::none) return;
+  for (const int side : {0, 1}) {
+    const RodRange &rod = elements.rods[std::size_t(p.rodOf(side))];
+    if (p.isBody(side))
+      addBody(rod, elements.pairOfBody(p.body(side)), half * side, d, out.blocks);
+    else
+      addEdge(rod, p.edgeOf(side), half * side, d, out.blocks);
+  }
+  if (number < 0) return;
+  double *to = out.blocks.touching(number);
+  for (int a = 0; a < half; ++a)
+    for (int b = 0; b < half; ++b) to[half * a + b] += d.hessian(a, half + b);
+}
+
+} // namespace tendril
