@@ -118,7 +118,8 @@ std::array<Vec3, 2> Neighbours::boxOf(const Room &room, int rod, int edge) const
 bool Neighbours::isNear(const Room &room, int rod, int edge, int to_rod, int to_edge) const {
   std::array<Vec3, 4> x, way;
   double away = scene_.rods[std::size_t(rod)].contact.radius + scene_.rods[std::size_t(to_rod)].contact.radius +
-                0.25 * (width_[std::size_t(rod)] + width_[std::size_t(to_rod)]);
+                0.25 * (width_[std::size_t(rod)] + width_[std::size_t(to_rod)]),
+         beyond = 0;
   const bool together = rod == to_rod; // else each is anywhere on its way: about the middle of that
   for (const int side : {0, 1}) {
     const RodRange &range = elements_.rods[std::size_t(side == 0 ? rod : to_rod)];
@@ -131,11 +132,13 @@ bool Neighbours::isNear(const Room &room, int rod, int edge, int to_rod, int to_
       x[k] = room.start[v] + (together ? 0 : 0.5) * way[k];
       most = std::max(most, room.beyond[v] + (together ? 0 : 0.5 * way[k].norm()));
     }
-    away += most;
+    beyond += most;
   }
-  const auto [low, high] = boxOf(room, rod, edge);
-  const auto [other_low, other_high] = boxOf(room, to_rod, to_edge);
-  if ((low.array() > other_high.array()).any() || (other_low.array() > high.array()).any()) return false;
+  if (together) { // the one from the other no farther than the edges between let it
+    const double between = alongRod(rod, edge, to_edge) + lengthOf(rod, edge) + lengthOf(rod, to_edge);
+    beyond = std::min(beyond, room.bend[std::size_t(rod)] * between);
+  }
+  away += beyond;
   if (closest(x[0], x[1], x[2], x[3]).distance < away) return true;
   return together && freePart(x, way, away, 1e-3 * away) < 1;
 }
@@ -153,19 +156,47 @@ TouchingPair Neighbours::pairOf(int rod, int edge, int to_rod, int to_edge) cons
           {a.slot(edge), a.slot((edge + 1) % a.vertices), b.slot(to_edge), b.slot((to_edge + 1) % b.vertices)}};
 }
 
+/// Whether the edges of a rod from one to another, [begin, end), keep so near to one direction, all along their ways,
+/// that none of them touches another: what lies between two of them keeps their nearest points apart.
+bool Neighbours::isStraight(const Room &room, int rod, int begin, int end) const {
+  const RodRange &range = elements_.rods[std::size_t(rod)];
+  const ContactSettings &contact = scene_.rods[std::size_t(rod)].contact;
+  const auto at = [&](int i) { return std::size_t(range.first_vertex + i % range.vertices); };
+  const Vec3 along = room.start[at(end)] - room.start[at(begin)];
+  const double length = along.norm();
+  if (!(length > 0)) return false;
+  const double closest_ends = 2 * contact.radius + 0.5 * width_[std::size_t(rod)],
+               apart = std::max(pi * contact.radius, 2 * contact.radius + width_[std::size_t(rod)]),
+               least = room.bend[std::size_t(rod)] + closest_ends / apart;
+  if (least > 1) return false;
+  for (int i = begin; i < end; ++i) {
+    const Vec3 edge = room.start[at(i + 1)] - room.start[at(i)], more = room.way[at(i + 1)] - room.way[at(i)];
+    const double now = edge.dot(along), then = now + more.dot(along);
+    if (!(std::min(now, then) > least * length * lengthOf(rod, i % range.edges))) return false;
+  }
+  return true;
+}
+
 namespace {
 
-/// An edge in one cell of the grid.
-struct InCell {
-  std::uint64_t cell;
-  int edge; ///< place in the list of boxes
-  bool operator<(const InCell &other) const { return std::pair(cell, edge) < std::pair(other.cell, other.edge); }
-};
+constexpr int chunk_edges = 8;
 
-struct Box {
-  int rod, edge;
+/// Neighbouring edges of a rod, and the box in which they may be.
+struct Chunk {
+  int rod, begin, end;
   Vec3 low, high;
 };
+
+/// A chunk in one cell of the grid.
+struct InCell {
+  std::uint64_t cell;
+  int chunk;
+  bool operator<(const InCell &other) const { return std::pair(cell, chunk) < std::pair(other.cell, other.chunk); }
+};
+
+bool overlap(const Vec3 &low, const Vec3 &high, const Vec3 &other_low, const Vec3 &other_high) {
+  return (low.array() <= other_high.array()).all() && (other_low.array() <= high.array()).all();
+}
 
 bool isBefore(const TouchingPair &a, const TouchingPair &b) {
   return std::tuple(a.rod, a.edge, a.to_rod, a.to_edge) < std::tuple(b.rod, b.edge, b.to_rod, b.to_edge);
@@ -173,23 +204,45 @@ bool isBefore(const TouchingPair &a, const TouchingPair &b) {
 
 } // namespace
 
+/// Of one rod whose chunks follow each other, what is straight does not touch itself.
+bool Neighbours::isApart(const Room &room, int rod, int edge, int to_edge) const {
+  const RodRange &range = elements_.rods[std::size_t(rod)];
+  const int chunks = (range.edges + chunk_edges - 1) / chunk_edges, a = std::max(edge, to_edge) / chunk_edges,
+            b = std::min(edge, to_edge) / chunk_edges;
+  if (a - b <= 1) return isStraight(room, rod, b * chunk_edges, std::min((a + 1) * chunk_edges, range.edges));
+  return range.closed && b == 0 && a == chunks - 1 &&
+         isStraight(room, rod, a * chunk_edges, range.edges + std::min(chunk_edges, range.edges));
+}
+
 std::vector<TouchingPair> Neighbours::find(const Room &room) const {
   constexpr int bits = 21, most_cells = 1 << (bits - 1); // along an axis
-  std::vector<Box> boxes;
+  std::vector<Chunk> chunks;
   std::vector<double> sizes;
   Vec3 origin = Vec3::Constant(HUGE_VAL), far = -origin;
   for (int r = 0; r < int(elements_.rods.size()); ++r) {
     const RodRange &rod = elements_.rods[std::size_t(r)];
-    if (!scene_.rods[std::size_t(r)].contact.touchesRods()) continue;
-    for (int i = 0; i < rod.edges; ++i) {
-      const auto [low, high] = boxOf(room, r, i);
-      boxes.push_back({r, i, low, high});
-      sizes.push_back((high - low).maxCoeff());
-      origin = origin.cwiseMin(low);
-      far = far.cwiseMax(high);
+    const ContactSettings &contact = scene_.rods[std::size_t(r)].contact;
+    if (!contact.touchesRods()) continue;
+    for (int i = 0; i < rod.edges; i += chunk_edges) {
+      Chunk chunk{r, i, std::min(i + chunk_edges, rod.edges), Vec3::Constant(HUGE_VAL), Vec3::Constant(-HUGE_VAL)};
+      double beyond = 0;
+      for (int k = chunk.begin; k <= chunk.end; ++k) {
+        const std::size_t v = std::size_t(rod.first_vertex + k % rod.vertices);
+        const Vec3 &x = room.start[v], there = x + room.way[v];
+        chunk.low = chunk.low.cwiseMin(x.cwiseMin(there));
+        chunk.high = chunk.high.cwiseMax(x.cwiseMax(there));
+        beyond = std::max(beyond, room.beyond[v]);
+      }
+      const double about = contact.radius + 0.25 * width_[std::size_t(r)] + beyond;
+      chunk.low.array() -= about;
+      chunk.high.array() += about;
+      sizes.push_back((chunk.high - chunk.low).maxCoeff());
+      origin = origin.cwiseMin(chunk.low);
+      far = far.cwiseMax(chunk.high);
+      chunks.push_back(chunk);
     }
   }
-  if (boxes.empty()) return {};
+  if (chunks.empty()) return {};
   std::nth_element(sizes.begin(), sizes.begin() + std::ptrdiff_t(sizes.size() / 2), sizes.end());
   const double cell = std::max(sizes[sizes.size() / 2], (far - origin).maxCoeff() / most_cells);
   auto cellAt = [&](const Vec3 &x) {
@@ -199,25 +252,41 @@ std::vector<TouchingPair> Neighbours::find(const Room &room) const {
   };
   auto keyOf = [](std::uint64_t x, std::uint64_t y, std::uint64_t z) { return (x << 2 * bits) | (y << bits) | z; };
   std::vector<InCell> cells;
-  for (std::size_t k = 0; k < boxes.size(); ++k) {
-    const auto low = cellAt(boxes[k].low), high = cellAt(boxes[k].high);
+  for (std::size_t k = 0; k < chunks.size(); ++k) {
+    const auto low = cellAt(chunks[k].low), high = cellAt(chunks[k].high);
     for (std::uint64_t x = low[0]; x <= high[0]; ++x)
       for (std::uint64_t y = low[1]; y <= high[1]; ++y)
         for (std::uint64_t z = low[2]; z <= high[2]; ++z) cells.push_back({keyOf(x, y, z), int(k)});
   }
   std::sort(cells.begin(), cells.end());
   std::vector<TouchingPair> pairs;
+  auto take = [&](const Chunk &a, const Chunk &b) {
+    const bool same = a.rod == b.rod, itself = same && a.begin == b.begin;
+    if (same && (scene_.rods[std::size_t(a.rod)].contact.rods != ContactSettings::Rods::all ||
+                 isApart(room, a.rod, a.begin, b.begin)))
+      return;
+    std::array<std::array<Vec3, 2>, chunk_edges> boxes;
+    for (int j = b.begin; j < b.end; ++j) boxes[std::size_t(j - b.begin)] = boxOf(room, b.rod, j);
+    for (int i = a.begin; i < a.end; ++i) {
+      const auto [low, high] = boxOf(room, a.rod, i);
+      if (!overlap(low, high, b.low, b.high)) continue;
+      for (int j = b.begin; j < (itself ? i : b.end); ++j) {
+        const auto &[other_low, other_high] = boxes[std::size_t(j - b.begin)];
+        if (overlap(low, high, other_low, other_high) && mayTouch(a.rod, i, b.rod, j) &&
+            isNear(room, a.rod, i, b.rod, j))
+          pairs.push_back(pairOf(a.rod, i, b.rod, j));
+      }
+    }
+  };
   for (std::size_t begin = 0, end; begin < cells.size(); begin = end) {
     end = begin + 1;
     while (end < cells.size() && cells[end].cell == cells[begin].cell) ++end;
     for (std::size_t i = begin; i < end; ++i)
-      for (std::size_t j = begin; j < i; ++j) {
-        const Box &a = boxes[std::size_t(cells[i].edge)], &b = boxes[std::size_t(cells[j].edge)];
-        if ((a.low.array() > b.high.array()).any() || (b.low.array() > a.high.array()).any()) continue;
+      for (std::size_t j = begin; j <= i; ++j) {
+        const Chunk &a = chunks[std::size_t(cells[i].chunk)], &b = chunks[std::size_t(cells[j].chunk)];
+        if (!overlap(a.low, a.high, b.low, b.high)) continue;
         const auto first = cellAt(a.low.cwiseMax(b.low)); // they meet in other cells, too
-        if (keyOf(first[0], first[1], first[2]) != cells[begin].cell) continue;
-        if (mayTouch(a.rod, a.edge, b.rod, b.edge) && isNear(room, a.rod, a.edge, b.rod, b.edge))
-          pairs.push_back(pairOf(a.rod, a.edge, b.rod, b.edge));
+        if (keyOf(first[0], first[1], first[2]) == cells[begin].cell) take(a, b);
       }
   }
   std::sort(pairs.begin(), pairs.end(), isBefore);
@@ -230,8 +299,13 @@ std::vector<TouchingPair> Neighbours::findByAll(const Room &room) const {
   for (int r = 0; r < rods; ++r)
     for (int i = 0; i < elements_.rods[std::size_t(r)].edges; ++i)
       for (int q = 0; q <= r; ++q)
-        for (int j = 0; j < (q == r ? i : elements_.rods[std::size_t(q)].edges); ++j)
-          if (mayTouch(r, i, q, j) && isNear(room, r, i, q, j)) pairs.push_back(pairOf(r, i, q, j));
+        for (int j = 0; j < (q == r ? i : elements_.rods[std::size_t(q)].edges); ++j) {
+          const auto [low, high] = boxOf(room, r, i);
+          const auto [other_low, other_high] = boxOf(room, q, j);
+          if (overlap(low, high, other_low, other_high) && mayTouch(r, i, q, j) && isNear(room, r, i, q, j) &&
+              !(q == r && isApart(room, r, i, j)))
+            pairs.push_back(pairOf(r, i, q, j));
+        }
   return pairs;
 }
 

@@ -58,7 +58,9 @@ public:
   bool roundsAsStrains() const override { return false; }
 
   double energy(const Configuration &c, int r) const override {
-    double sum = energyBy(rods_.stiffness(), c, r);
+    double sum = 0;
+    rods_.visit(c, {r, r + 1},
+                [&](const TouchingPair &p, const Touching &t) { sum += t.weight * rods_.lawOf(p)(t.gap).value; });
     for (const SlidingPair &p : sliding_[std::size_t(r)].points) sum += forceOn(p, c).value;
     return sum;
   }
@@ -90,7 +92,7 @@ public:
       for (const TouchingPair &p : rods_.pairs().of({r, r + 1})) {
         OfPair d;
         bool any = false;
-        const NormalLaw law = rods_.lawOf(p);
+        const NormalLaw &law = rods_.lawOf(p);
         const std::array<Vec3, 4> x = TouchingRods::pointsOf(p, c);
         rods_.visit(p, x, law.reach(), [&](const Touching &t) {
           any = true;
@@ -112,7 +114,7 @@ public:
     std::array<double, 2> sum{0, 0};
     for (const int k : rods_.pairsOf(r)) {
       const TouchingPair &p = rods_.pairs().items[std::size_t(k)];
-      const NormalLaw law = rods_.lawOf(p);
+      const NormalLaw &law = rods_.lawOf(p);
       rods_.visit(p, TouchingRods::pointsOf(p, c), law.reach(), [&](const Touching &t) {
         const GapLaw g = law(t.gap);
         double closing = 0;

@@ -13,6 +13,7 @@ TouchingRods::TouchingRods(const Scene &scene, const Elements &elements)
 
 void TouchingRods::find(const State &state, const Configuration &start, const Planes &way, const Step &step,
                         double room) {
+  static_ = step.isStatic();
   const bool surprised = room > 1 && std::find(surprised_.begin(), surprised_.end(), true) != surprised_.end();
   makeRoom(start, &way, room);
   take(neighbours_.find(room_));
@@ -20,6 +21,12 @@ void TouchingRods::find(const State &state, const Configuration &start, const Pl
   std::fill(bounded_.begin(), bounded_.end(), 0);
   std::fill(surprised_.begin(), surprised_.end(), false);
   setStiffness(state, start, way, step);
+  setLaws();
+}
+
+void TouchingRods::setLaws() const {
+  laws_.clear();
+  for (const TouchingPair &p : pairs_.items) laws_.push_back(lawOf(stiffness_, p));
 }
 
 /// Those of one rod that the way takes near each other, and all of two rods. \param all of one rod, too
@@ -31,8 +38,8 @@ void TouchingRods::expect(const Configuration &start, const Planes &way, bool al
       const std::array<Vec3, 4> x = pointsOf(p, start);
       std::array<Vec3, 4> ways;
       for (std::size_t k = 0; k < 4; ++k) ways[k] = way.vector(0, p.slot[k]);
-      expected =
-          nearlyTouch(scene_, p, x) || freePart(x, ways, radiiOf(p) + 3 * lawOf(p).reach(), 0.1 * widthOf(p)) < 1;
+      expected = nearlyTouch(scene_, p, x) ||
+                 freePart(x, ways, radiiOf(p) + 3 * lawOf(stiffness_, p).reach(), 0.1 * widthOf(p)) < 1;
     }
     expected_[std::size_t(p.number)] = expected ? count++ : -1;
   }
@@ -50,6 +57,7 @@ void TouchingRods::cover(const Configuration &c, int r) const {
   if (covered) return;
   makeRoom(c, nullptr, 1);
   take(neighbours_.find(room_));
+  setLaws();
 }
 
 /// Between samples edges come a little nearer to each other than samples do, whose energy is what holds them apart: no
@@ -59,11 +67,14 @@ double TouchingRods::wallOf(const TouchingPair &p) const {
   return settings(p.rod).isBarrier() ? wall - 0.25 * widthOf(p) : wall;
 }
 
-/// Vertices go along their ways, and as far to all sides.
+/// Vertices go along their ways, and as far to all sides; edges turn by about 15 degrees from theirs, or in statics,
+/// where no way is known, by 60.
 void TouchingRods::makeRoom(const Configuration &start, const Planes *way, double room) const {
+  const double turn = (static_ ? 1 : 0.25) * room;
   room_.start.resize(std::size_t(elements_.vertices()));
   room_.way.assign(room_.start.size(), Vec3::Zero());
   room_.beyond.resize(room_.start.size());
+  room_.bend.assign(scene_.rods.size(), turn);
   for (std::size_t r = 0; r < scene_.rods.size(); ++r) {
     const RodRange &rod = elements_.rods[r];
     double most = 0;
@@ -91,10 +102,18 @@ bool TouchingRods::isInRoom(const Configuration &from, const Configuration &to, 
     along += way.dot(moved(i));
     all += way.squaredNorm();
   }
-  const double gone = all > 0 ? std::clamp(along / all, 0.0, 1.0) : 0;
+  const double gone = all > 0 ? std::clamp(along / all, 0.0, 1.0) : 0, bend = room_.bend[std::size_t(r)];
+  auto off = [&](int i) { return Vec3(moved(i) - gone * room_.way[std::size_t(rod.first_vertex + i)]); };
+  const bool bends = settings(r).rods == ContactSettings::Rods::all;
+  Vec3 before = off(rod.closed ? rod.vertices - 1 : 0);
   for (int i = 0; i < rod.vertices; ++i) {
-    const std::size_t v = std::size_t(rod.first_vertex + i);
-    if (!((moved(i) - gone * room_.way[v]).squaredNorm() <= room_.beyond[v] * room_.beyond[v])) return false;
+    const double beyond = room_.beyond[std::size_t(rod.first_vertex + i)];
+    const Vec3 here = off(i);
+    if (!(here.squaredNorm() <= beyond * beyond)) return false;
+    const int edge = i > 0 ? i - 1 : rod.edges - 1; // of an open rod's first vertex nothing has turned
+    const double most = bend * elements_.restLength()[rod.slot(edge)];
+    if (bends && !((here - before).squaredNorm() <= most * most)) return false;
+    before = here;
   }
   return true;
 }
@@ -209,15 +228,15 @@ void TouchingRods::bearAsDrawn(const Configuration &start, const std::vector<dou
   constexpr double least = 1e-3;
   std::vector<double> pressed(load.size(), 0), borne = stiffness_;
   for (const TouchingPair &p : pairs_.items)
-    visit(p, pointsOf(p, start), lawOf(p).reach(), [&](const Touching &t) {
-      for (const int r : {p.rod, p.to_rod}) pressed[std::size_t(r)] -= t.weight * lawOf(p)(t.gap).slope;
+    visit(p, pointsOf(p, start), lawOf(stiffness_, p).reach(), [&](const Touching &t) {
+      for (const int r : {p.rod, p.to_rod}) pressed[std::size_t(r)] -= t.weight * lawOf(stiffness_, p)(t.gap).slope;
     });
   auto isFixed = [&](std::size_t r) { return !settings(int(r)).isBarrier() || settings(int(r)).stiffness > 0; };
   for (std::size_t r = 0; r < load.size(); ++r)
     if (pressed[r] > load[r] && !isFixed(r)) borne[r] *= std::max(load[r] / pressed[r], least);
   for (const TouchingPair &p : pairs_.items) {
     bool touches = false;
-    visit(p, pointsOf(p, start), lawOf(p).reach(), [&](const Touching &) { touches = true; });
+    visit(p, pointsOf(p, start), lawOf(stiffness_, p).reach(), [&](const Touching &) { touches = true; });
     const double both = std::min(borne[std::size_t(p.rod)], borne[std::size_t(p.to_rod)]);
     for (const int r : {p.rod, p.to_rod})
       if (touches && !isFixed(std::size_t(r))) stiffness_[std::size_t(r)] = std::min(stiffness_[std::size_t(r)], both);

@@ -324,6 +324,13 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
                        ": the scene has no 'colliders' that rods could touch, nor do they touch each other ('contact: "
                        "{rods: all}') or bodies ('contact: {bodies: true}')");
   readIgnored(map, out);
+  const auto feels = [](const auto &of) { return of.contact.touchesBodies(); };
+  for (const Body &body : out.scene.held_bodies)
+    if (feels(body) && (std::any_of(out.scene.rods.begin(), out.scene.rods.end(), feels) ||
+                        std::any_of(out.scene.bodies.begin(), out.scene.bodies.end(), feels)))
+      out.notes.push_back("warning: body '" + body.name +
+                          "' is fixed or goes by its motion, and what touches bodies passes through it; write it as a "
+                          "collider");
   map.finish();
   out.scene.hostBodies();
   out.source.paths = {path};

@@ -37,10 +37,14 @@ void IncrementalPotential::beginStep(const State &start, const Step &step) {
   retraction_.setInverseTimeSquared(step.isStatic() ? 0 : 1 / (step.dt * step.dt));
 }
 
-void IncrementalPotential::beginRod(const State &start, int r) {
+void IncrementalPotential::placeRod(const State &start, int r) {
   setRod(start, elements_, r, start_);
   iterate_.copyRod(elements_, r, start_);
   takeArms(r);
+}
+
+void IncrementalPotential::beginRod(const State &start, int r) {
+  placeRod(start, r);
   if (step_.twist_reference) carryFrames(*step_.rule, elements_, r, start_, reference_);
   axial_.beginStep(start_, step_, r);
   for (auto &term : terms_) term->beginStep(start, start_, step_, r);
@@ -51,6 +55,10 @@ void IncrementalPotential::beginRod(const State &start, int r) {
 }
 
 void IncrementalPotential::findTouching(const State &start, double room) {
+  for (int r = 0; r < all().end; ++r) {
+    placeRod(start, r);
+    supports_.follow(r, iterate_);
+  }
   Planes way = dofs_.makePlanes();
   remainingMotion(all(), way);
   for (int v = 0; v < elements_.vertices() && step_.rule; ++v)

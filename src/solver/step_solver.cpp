@@ -68,8 +68,8 @@ PetscErrorCode StepSolver::setUpBlocks(const std::vector<RodSet> &blocks) {
 PetscErrorCode StepSolver::begin(const State &start, const Step &step) {
   PetscFunctionBeginUser;
   potential_->beginStep(start, step);
-  for (int r = 0; r < potential_->all().end; ++r) potential_->beginRod(start, r);
   PetscCall(findTouching(start, 1));
+  for (int r = 0; r < potential_->all().end; ++r) potential_->beginRod(start, r);
   PetscFunctionReturn(0);
 }
 
@@ -79,10 +79,8 @@ constexpr double most_room = 1e4;
 PetscErrorCode StepSolver::solve(const State &start, const Step &step, NewtonReport *report, Seek seek,
                                  const Guess *guess) {
   PetscFunctionBeginUser;
-  if (potential_->touches())
-    PetscCall(begin(start, step));
-  else
-    potential_->beginStep(start, step); // blocks begin with their rods, while these are in the cache
+  potential_->beginStep(start, step);
+  PetscCall(findTouching(start, 1)); // blocks begin with their rods, while these are in the cache
   for (double room = 4;; room *= 4) {
     PetscCall(solveBlocks(start, step, report, seek, guess));
     if (!report->bounded || room > most_room) break;

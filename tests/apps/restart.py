@@ -319,6 +319,19 @@ def amongRods(tmp):
     print("rods that touch each other go on to the same bits")
 
 
+def bodiesTouch(tmp):
+    """A rope and a ball on a crate, which lies on the floor, with friction."""
+    base = ["-scene", source + "/data/scenes/crate.yaml", "-dt", 2**-8]
+    run(0, *base, "-t_end", 0.3125, "-output_dir", tmp + "/half")
+    run(0, *base, "-t_end", 0.4375, "-restart", tmp + "/half/checkpoint.h5", "-output_dir", tmp + "/on")
+    run(0, *base, "-t_end", 0.4375, "-output_dir", tmp + "/whole")
+    with h5py.File(tmp + "/whole/trajectory.h5") as f:
+        moved = np.abs(f["state/body_position"][-1] - f["state/body_position"][0]).max(axis=1)
+    assert (moved > 1e-5).all(), moved
+    same(final(tmp + "/on"), final(tmp + "/whole"))
+    print("bodies that touch rods and each other go on to the same bits")
+
+
 def joined(tmp):
     """Rods that junctions join, rigidly and by a ball, under a pin that moves, and springs between vertices: frames and
     reactions go on to the same bits."""
@@ -486,7 +499,7 @@ def full(tmp):
     print("full disks are told,", with_frames, "with frames")
 
 
-for test in (letGo, changes, balances, folders, automatic, orders, touching, amongRods, joined, signals, full):
+for test in (letGo, changes, balances, folders, automatic, orders, touching, amongRods, bodiesTouch, joined, signals, full):
     if len(sys.argv) > 3 and test.__name__ not in sys.argv[3:]:
         continue
     with tempfile.TemporaryDirectory() as folder:

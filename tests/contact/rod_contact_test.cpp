@@ -81,6 +81,7 @@ TEST(Neighbours, AreFoundByTheGridAsByLookingAtAll) {
       room.way.push_back(0.01 * random.vector());
       room.beyond.push_back(0.01 * std::abs(random()));
     }
+    for (int r = 0; r < 12; ++r) room.bend.push_back(std::abs(random()));
     const std::vector<TouchingPair> grid = neighbours.find(room), all = neighbours.findByAll(room);
     ASSERT_EQ(grid.size(), all.size());
     found += grid.size();

@@ -10,10 +10,11 @@
 namespace tendril {
 
 /// Where the vertices of the scene may be: those of a rod have all gone the same part of their ways from where they
-/// were, and are no farther from there than so much [m].
+/// were, and are no farther from there than so much [m]; nor are edges from where that takes them, over their length.
 struct Room {
   std::vector<Vec3> start, way;
   std::vector<double> beyond;
+  std::vector<double> bend; ///< per rod
 };
 
 class Neighbours {
@@ -49,6 +50,8 @@ private:
   double alongRod(int rod, int edge, int to_edge) const;
   double toArc(int rod, int edge, double arc) const;
   std::array<Vec3, 2> boxOf(const Room &room, int rod, int edge) const;
+  bool isStraight(const Room &room, int rod, int begin, int end) const;
+  bool isApart(const Room &room, int rod, int edge, int to_edge) const;
   bool isNear(const Room &room, int rod, int edge, int to_rod, int to_edge) const;
   TouchingPair pairOf(int rod, int edge, int to_rod, int to_edge) const;
   void addJoint(int rod, int vertex, int to_rod, int to_vertex);

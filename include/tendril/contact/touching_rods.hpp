@@ -45,7 +45,7 @@ public:
 
   const ContactSettings &settings(int rod) const { return scene_.rods[std::size_t(rod)].contact; }
   const std::vector<double> &stiffness() const { return stiffness_; } ///< of barriers, per rod [N/m]
-  NormalLaw lawOf(const TouchingPair &p) const { return lawOf(stiffness_, p); }
+  const NormalLaw &lawOf(const TouchingPair &p) const { return laws_[std::size_t(p.number)]; }
   NormalLaw lawOf(const std::vector<double> &stiffness, const TouchingPair &p) const {
     return lawBetween(settings(p.rod), stiffness[std::size_t(p.rod)], settings(p.to_rod),
                       stiffness[std::size_t(p.to_rod)]);
@@ -81,6 +81,8 @@ private:
   mutable std::vector<char> surprised_; ///< per rod: whether a watched pair touches
   mutable std::vector<int> expected_;   ///< per pair
   mutable Room room_;
+  bool static_ = false;
+  mutable std::vector<NormalLaw> laws_; ///< per pair
   mutable ByRod<TouchingPair> pairs_;
   mutable std::vector<std::array<char, 2>> goes_on_; ///< per pair and side: whether the edge behind the other touches
   mutable std::vector<std::vector<int>> of_rod_;
@@ -91,6 +93,7 @@ private:
                                        : 0.2 * radiiOf(p);
   }
   double wallOf(const TouchingPair &p) const;
+  void setLaws() const;
   void makeRoom(const Configuration &start, const Planes *way, double room) const;
   bool isInRoom(const Configuration &from, const Configuration &to, double part, int rod) const;
   void take(std::vector<TouchingPair> pairs) const;

@@ -41,8 +41,8 @@ public:
   /// state with supports' frames (not yet their positions) moved to the end of the step.
   void beginStep(const State &start, const Step &step);
   void beginRod(const State &start, int rod);
-  /// Whether rods and bodies touch each other. Then findTouching has to find what may touch in a step after it has
-  /// begun with all of its rods, which makes islands of them.
+  /// Whether rods and bodies touch each other. Then findTouching has to find what may touch in a step before it begins
+  /// with its rods, which makes islands of them.
   bool touches() const { return touches_; }
   void findTouching(const State &start, double room);
   /// See Term::nearlyTouch, at the iterate.
@@ -278,6 +278,7 @@ private:
   bool obstacles_move_;
   std::vector<char> obstacles_held_; ///< per rod
 
+  void placeRod(const State &start, int rod);
   void assembleRod(int rod, HessianKind hessian);
   void takeArms(int rod);
   void moveObstacles(int rod);
