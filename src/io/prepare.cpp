@@ -139,14 +139,15 @@ std::vector<std::string> notesOnContact(const Simulation &run) {
           " and no rod or body has any: of both the geometric mean counts; write 'contact: {friction: ...}', too");
   for (int r = 0; r < int(run.scene.rods.size()); ++r) {
     const ContactSettings &contact = run.scene.rods[r].contact;
-    if (!run.scene.touches(r) || contact.radius == 0) continue;
+    if (!(run.scene.touches(r) || contact.touchesMoving()) || contact.radius == 0) continue;
     const RodRange &rod = run.elements->rods[r];
     const double *const rest = run.elements->restLength();
     const double edge = *std::max_element(rest + rod.first_slot, rest + rod.edgeEnd());
     if (edge >= longest * contact.radius * (1 - 1e-9))
-      notes.push_back("warning: rod '" + run.scene.rods[r].name + "' has edges of up to " +
-                      shortText(edge / contact.radius) +
-                      " of its radii: it may miss obstacles that are smaller; shorter edges feel them");
+      notes.push_back(
+          "warning: rod '" + run.scene.rods[r].name + "' has edges of up to " + shortText(edge / contact.radius) +
+          " of its radii: it may miss obstacles that are smaller, and is felt as a chain of straight pieces; "
+          "take shorter edges");
     if (contact.quadrature == 0) continue;
     const double apart = edge / contact.quadrature;
     for (const Collider &c : run.scene.colliders)

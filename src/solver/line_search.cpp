@@ -87,7 +87,7 @@ IncrementalPotential::RodEnergy NewtonSolver::tryLength(RodSet island, double le
   (void)PetscLogEventBegin(events().configuration, 0, 0, 0, 0);
   double free = 1;
   const RetractionKind kind = potential_->settings.retraction;
-  const bool joined = potential_->dofs().isJoined(island),
+  const bool joined = potential_->dofs().isCoupled(island),
              possible = joined && kind == RetractionKind::length
                             ? tryCorrected(island, length, &free)
                             : potential_->tryMove(work_->increment, length, island, kind, work_->trial, &free);
@@ -298,7 +298,7 @@ void NewtonSolver::predict() {
     dofs.copyJoined(island, work_->increment);
     potential_->turnFrames(island, work_->increment);
     if (!potential_->tryMove(work_->increment, 1, island, kind, work_->trial)) continue;
-    if (dofs.isJoined(island)) // whose edges get longer by squares: forces as if they did not
+    if (dofs.isCoupled(island)) // whose edges get longer by squares: forces as if they did not
       for (int r = island.begin; r < island.end; ++r)
         potential_->setTrialForces(work_->increment, 1, r, kind, work_->trial);
     double before = 0, after = 0;

@@ -35,7 +35,7 @@ bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r,
     const double next = nextObstacleTime(r);
     trial.setObstacleTime(r, part == 1 ? next : now + part * (next - now));
   }
-  if (dofs_.isJoined({r, r + 1})) kind = RetractionKind::additive;
+  if (dofs_.isCoupled(dofs_.islandOf(r))) kind = RetractionKind::additive;
   if (!retraction_.apply(iterate_, increment, scale, r, kind, trial)) return false;
   setTrialForces(increment, scale, r, kind, trial);
   const double fraction = freeFraction(iterate_, trial, r);

@@ -210,6 +210,32 @@ TEST(RodContact, LeavesMomentaAlone) {
   EXPECT_LT(moment.norm(), 1e-12 * size_of_moment);
 }
 
+/// A tip before the middle vertex of a rod that is bent towards it, straight, or bent away: what pushes it goes along
+/// the line between both, for all is the same on both sides.
+TEST(RodContact, ATipFeelsASideEvenly) {
+  for (const double bent : {-1e-3, -1e-5, 0.0, 1e-5, 1e-3}) {
+    Scene scene;
+    scene.gravity = Vec3::Zero();
+    scene.rods = {wire("tip", Vec3(-0.06, 0, 0), Vec3::Zero(), 12),
+                  wire("side", Vec3(0.0102, -0.03, 0), Vec3(0.0102, 0.03, 0), 12)};
+    for (Vec3 &x : scene.rods[1].position) x[0] += bent * std::abs(x[1]) / 0.005;
+    for (Rod &rod : scene.rods) rod.contact.stiffness = 1e3;
+    Simulation sim;
+    EXPECT_PETSC(sim.setUp(scene, dynamics(0.01, 1)));
+    const std::unique_ptr<Term> contact = makeRodContact(sim.scene, *sim.elements);
+    const Configuration c = configurationOf(sim.state, sim.scene, *sim.elements, 0);
+    std::vector<TouchingPair> pairs;
+    contact->findTouching(sim.state, c, sim.dofs.makePlanes(), {}, 1, pairs);
+    Derivatives d(sim.elements->slots, true);
+    d.blocks.setTouching(pairs.size());
+    contact->addBetween(c, {0, 2}, d, HessianKind::none);
+    Vec3 force = Vec3::Zero();
+    for (int v = 0; v < 13; ++v) force += d.gradient.vector(0, sim.elements->vertex_slot[std::size_t(v)]);
+    EXPECT_GT(force[0], 1e-3) << bent;
+    EXPECT_LT(std::abs(force[1]), 1e-10 * force[0]) << bent;
+  }
+}
+
 /// Crossed strings (data/reference/contact_crossed_strings.csv, third row): each has an edge that stays level at the
 /// crossing, so that the discrete strings have the exact force at the distance that the law keeps, which is measured.
 /// \param width of the barrier, over the radius \return by how much the force is off, of itself

@@ -118,8 +118,8 @@ void TouchingRods::visit(const TouchingPair &p, const std::array<Vec3, 4> &x, do
     const std::size_t own = std::size_t(2 * side), other = 2 - own;
     const int rod = side == 0 ? p.rod : p.to_rod, edge = side == 0 ? p.edge : p.to_edge;
     const double rest = elements_.restLength()[elements_.rods[std::size_t(rod)].slot(edge)];
-    constexpr double most = 1000;
-    const int count = int(std::clamp(std::ceil(rest / (0.5 * thinner * fine)), 1.0, most));
+    constexpr double most = 1000, alike = 1 - 1e-9; // edges whose lengths differ by rounding have as many
+    const int count = int(std::clamp(std::ceil(alike * rest / (0.5 * thinner * fine)), 1.0, most));
     const Vec3 along = x[own + 1] - x[own];
     const double spacing = along.norm() / count;
     for (int k = 0; k <= count;) {
