@@ -89,7 +89,8 @@ bool Neighbours::mayTouch(int rod, int edge, int to_rod, int to_edge) const {
   const double radii = a.radius + b.radius,
                least =
                    std::max(0.5 * pi * radii, radii + 0.5 * (width_[std::size_t(rod)] + width_[std::size_t(to_rod)]));
-  if (rod == to_rod) return a.rods == ContactSettings::Rods::all && alongRod(rod, edge, to_edge) > least;
+  if (rod == to_rod) // points of a cloud are told apart one by one
+    return a.rods == ContactSettings::Rods::all && (a.point_cloud || alongRod(rod, edge, to_edge) > least);
   if (rod > to_rod) {
     std::swap(rod, to_rod);
     std::swap(edge, to_edge);
@@ -206,6 +207,7 @@ bool isBefore(const TouchingPair &a, const TouchingPair &b) {
 
 /// Of one rod whose chunks follow each other, what is straight does not touch itself.
 bool Neighbours::isApart(const Room &room, int rod, int edge, int to_edge) const {
+  if (scene_.rods[std::size_t(rod)].contact.point_cloud) return false;
   const RodRange &range = elements_.rods[std::size_t(rod)];
   const int chunks = (range.edges + chunk_edges - 1) / chunk_edges, a = std::max(edge, to_edge) / chunk_edges,
             b = std::min(edge, to_edge) / chunk_edges;

@@ -227,7 +227,7 @@ private:
       for (const bool own : {true, false}) {
         const int side = own ? t.side : 1 - t.side;
         const Rod &rod = scene_.rods[std::size_t(pair.rodOf(side))];
-        if (!rod.contact.friction_at_surface || rod.material.isCable()) continue;
+        if (!rod.contact.friction_at_surface || rod.material.isCable() || rod.contact.point_cloud) continue;
         const Frame frame = c.frameAt(pair.slot[std::size_t(2 * side)]);
         (own ? p.own : p.other).arm =
             (own ? -1 : 1) * (rod.contact.radius + 0.5 * t.gap) * (matrixOf(frame).transpose() * t.normal);

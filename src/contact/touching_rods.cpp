@@ -9,6 +9,23 @@ TouchingRods::TouchingRods(const Scene &scene, const Elements &elements)
     : scene_(scene), elements_(elements), neighbours_(scene, elements), stiffness_(scene.rods.size(), 0),
       bounded_(scene.rods.size(), 0), surprised_(scene.rods.size(), false) {
   for (std::size_t r = 0; r < scene.rods.size(); ++r) stiffness_[r] = scene.rods[r].contact.stiffness;
+  for (int q = 0; q < 4; ++q) points_[std::size_t(q)] = samplePoints(q == 0 ? 3 : q, 1, 1);
+}
+
+int TouchingRods::spheresOf(int r, int edge, std::array<SamplePoint, 3> &out) const {
+  const RodRange &rod = elements_.rods[std::size_t(r)];
+  auto length = [&](int i) { return elements_.restLength()[rod.slot(i)]; };
+  if (const int gauss = settings(r).cloud; gauss > 0) {
+    for (int k = 0; k < gauss; ++k) {
+      const SamplePoint &p = points_[std::size_t(gauss)][std::size_t(k)];
+      out[std::size_t(k)] = {p.at, p.weight * length(edge)};
+    }
+    return gauss;
+  }
+  const bool first = edge == 0 && !rod.closed, last = edge + 1 == rod.edges && !rod.closed;
+  out[0] = {0, 0.5 * (length(edge) + (first ? 0 : length(edge > 0 ? edge - 1 : rod.edges - 1)))};
+  if (last) out[1] = {1, 0.5 * length(edge)};
+  return last ? 2 : 1;
 }
 
 void TouchingRods::find(const State &state, const Configuration &start, const Planes &way, const Step &step,
@@ -142,6 +159,10 @@ double TouchingRods::smallestGap(const Configuration &c, int r) const {
   double least = HUGE_VAL;
   for (const TouchingPair &p : pairs_.of({r, r + 1})) {
     const std::array<Vec3, 4> x = pointsOf(p, c);
+    if (isCloud(p)) {
+      visitCloud(p, x, least, [&](const Touching &t) { least = std::min(least, t.gap); });
+      continue;
+    }
     const double radii = radiiOf(p), apart = farApart(x) - radii;
     if (apart < least) least = std::min(least, closest(x[0], x[1], x[2], x[3]).distance - radii);
   }

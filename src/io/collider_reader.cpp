@@ -83,17 +83,19 @@ constexpr ShapeKey shape_keys[] = {
 
 struct ContactKeys {
   KeyOf<KeyType::flag> bodies;
+  KeyOf<KeyType::word, KeyType::word_or_map> collider, cloud;
+  KeyOf<KeyType::number> exclusion_ratio;
   KeyOf<KeyType::word, KeyType::word_or_map> rods, law, friction_at, quadrature, stick;
   KeyOf<KeyType::number> radius, distance, stiffness, threshold, smoothing, friction, fall_off_velocity, slip_length,
       tangential_damping, normal_damping;
 };
 // clang-format off
 constexpr ContactKeys of_scene{
-    "contact.bodies", "contact.rods", "contact.law", "contact.friction_at", "contact.quadrature", "contact.stick", "contact.radius",
+    "contact.bodies", "contact.collider", "contact.cloud", "contact.exclusion_ratio", "contact.rods", "contact.law", "contact.friction_at", "contact.quadrature", "contact.stick", "contact.radius",
     "contact.distance", "contact.stiffness", "contact.threshold", "contact.smoothing", "contact.friction",
     "contact.fall_off_velocity", "contact.slip_length", "contact.tangential_damping", "contact.normal_damping"};
 constexpr ContactKeys of_rod{
-    "rods[].contact.bodies", "rods[].contact.rods", "rods[].contact.law", "rods[].contact.friction_at", "rods[].contact.quadrature", "rods[].contact.stick",
+    "rods[].contact.bodies", "rods[].contact.collider", "rods[].contact.cloud", "rods[].contact.exclusion_ratio", "rods[].contact.rods", "rods[].contact.law", "rods[].contact.friction_at", "rods[].contact.quadrature", "rods[].contact.stick",
     "rods[].contact.radius", "rods[].contact.distance", "rods[].contact.stiffness", "rods[].contact.threshold",
     "rods[].contact.smoothing", "rods[].contact.friction", "rods[].contact.fall_off_velocity", "rods[].contact.slip_length",
     "rods[].contact.tangential_damping", "rods[].contact.normal_damping"};
@@ -108,6 +110,14 @@ void readSettings(YamlMap &map, const ContactKeys &keys, ContactSettings &out) {
     const std::string which = map.word(keys.rods);
     out.rods = which == "all" ? Rods::all : which == "others" ? Rods::others : Rods::none;
   }
+  if (map.has(*keys.collider)) out.point_cloud = map.word(keys.collider) == "point_cloud";
+  if (map.has(*keys.cloud)) out.cloud = map.word(keys.cloud) == "vertices" ? 0 : std::stoi(map.word(keys.cloud));
+  if (map.has(*keys.exclusion_ratio) && !((out.exclusion_ratio = map.number(keys.exclusion_ratio)) > 1))
+    map.at(*keys.exclusion_ratio)
+        .fail("'exclusion_ratio' must be more than 1, or neighbours along a rod push each other");
+  for (const Key *key : {&*keys.cloud, &*keys.exclusion_ratio})
+    if (map.has(*key) && !out.point_cloud)
+      map.at(*key).fail("'" + std::string(key->name()) + "' is for 'collider: point_cloud'");
   if (map.has(*keys.bodies)) out.bodies = map.flag(keys.bodies);
   if (map.has(*keys.law)) {
     using Law = ContactSettings::Law;
@@ -255,6 +265,8 @@ void completeContact(const YamlValue &block, const Overrides &overrides, Scene &
       block.fail("rod '" + rod.name + "' has the contact radius 0, for which there is only 'law: penalty'");
     if (contact.radius == 0 && contact.touchesRods())
       block.fail("rod '" + rod.name + "' touches rods, and needs a contact radius above 0 for it");
+    if (contact.point_cloud && contact.isBarrier())
+      block.fail("rod '" + rod.name + "' is a point cloud, for which there is only 'law: penalty'");
     if (std::isnan(contact.distance)) contact.distance = 0.2 * contact.radius;
     if (contact.isBarrier() && contact.distance > contact.radius)
       block.fail("rod '" + rod.name + "': the 'distance' of its contact, " + shortText(contact.distance) +
@@ -264,6 +276,10 @@ void completeContact(const YamlValue &block, const Overrides &overrides, Scene &
     if (contact.touchesRods() && one->contact.law != contact.law)
       block.fail("rods '" + one->name + "' and '" + rod.name +
                  "' touch each other by two laws, barrier and penalty; give all rods that touch rods the same");
+    if (contact.touchesRods() && one->contact.point_cloud != contact.point_cloud)
+      block.fail("rods '" + one->name + "' and '" + rod.name +
+                 "' touch each other, one as capsules, one as a point cloud; give all rods that touch rods the same "
+                 "'collider'");
     if (contact.slip_length == 0) contact.slip_length = 1e-3 * (contact.radius > 0 ? contact.radius : 0.01);
   }
 }

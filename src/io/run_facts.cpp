@@ -93,6 +93,7 @@ std::string textOf(const ContactSettings &c) {
           : c.rods == ContactSettings::Rods::all ? ", with all rods"
                                                  : ", with other rods") +
          (c.touchesBodies() ? ", with bodies" : "") +
+         (c.point_cloud ? ", cloud of " + std::to_string(c.cloud) + " apart by " + textOf(c.exclusion_ratio) : "") +
          (c.apart_from | c.apart_to
               ? ", apart by " + std::to_string(c.apart_from) + " and " + std::to_string(c.apart_to)
               : "");

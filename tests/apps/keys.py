@@ -122,8 +122,16 @@ def exampleScene(path, value):
         if path.startswith("contact.ignore"):
             put(scene, "rods[].layer", "strands")
             put(scene, "colliders[].name", "floor")
-        if name in ("threshold", "smoothing"):
+        if path.startswith("contact.ignore[]."):  # two of a kind or of two
+            pair = scene["contact"]["ignore"][0]
+            if "bodies" in name:
+                scene["bodies"] = [{"name": "bob", "sphere": {"radius": 0.1}, "density": 1000, "position": [5, 5, 5]}]
+            other = {"rods": "colliders", "to_bodies": "bodies"}.get(name, "rods")
+            pair[other] = {"colliders": "floor", "bodies": "bob", "rods": "strands"}[other]
+        if name in ("threshold", "smoothing", "collider", "cloud", "exclusion_ratio") and "contact" in path:
             put(scene, path.rpartition(".")[0] + ".law", "penalty")
+        if name in ("cloud", "exclusion_ratio"):
+            put(scene, path.rpartition(".")[0] + ".collider", "point_cloud")
     if path.startswith("junctions"):  # a second rod begins where the first one ends
         put(scene, "rods[].line", {"from": [0, 0, 0], "to": [1, 0, 0], "edges": 6})
         put(scene, "supports[].rod", 0)

@@ -72,7 +72,7 @@ def mutate(scene, rng):
 READER_ONLY = ("cannot be opened", "must not be zero", "normal to", "not normal", "out of range", "there is no rod", "which 'rod'", "held twice",
                "zero length", "folds back", "too short", "never reaches", "parallel", "must not be empty, a number", "there is a rod", "whole number, or its ends",
                "has no twist", "cannot carry", "no twist to fix", "must increase", "contradicts", "free to move as a whole", "pin holds",
-               "holds no position", "comes out as", "is for -mode static", "deep in collider", "must not exceed its radius", "must be larger than 'bore'",
+               "holds no position", "comes out as", "is for -mode static", "deep in collider", "deep in body", "points against edge", "names two that pass", "is for 'collider", "only 'law: penalty'", "must not exceed its radius", "must be larger than 'bore'",
                "both zero", "natural curvature", "a junction needs", "is in junction", "no two vertices", "two supports hold", "in a rigid group",
                "a junction joins what", "'group' is for", "is for 'shared: true'", "no body", "take one of the two away", "degrees off", "the same 'gravity'", "no flexural stiffness that a weld",
                "is for the ends of a rod", "comes out as", "'size' must be positive", "the inertia of the shape", "with the name", "must not be a number")

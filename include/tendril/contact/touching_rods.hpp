@@ -3,6 +3,7 @@
 /// Edges of rods that touch in a step: where their samples are near, and how far they may move.
 
 #include "tendril/contact/neighbours.hpp"
+#include "tendril/contact/obstacles.hpp"
 #include "tendril/contact/segments.hpp"
 #include "tendril/energy/term.hpp"
 
@@ -56,6 +57,8 @@ public:
     for (std::size_t k = 0; k < 4; ++k) x[k] = c.displacements<double>(p.slot[k], c, p.slot[0]);
     return x;
   }
+  /// Whether a pair touches by points: both of its rods do, or neither.
+  bool isCloud(const TouchingPair &p) const { return settings(p.rod).point_cloud; }
   /// Calls visit(sample) for those of a pair within reach, one edge after the other.
   template <class Visit>
   void visit(const TouchingPair &p, const std::array<Vec3, 4> &x, double reach, Visit visit) const;
@@ -76,6 +79,7 @@ private:
   const Scene &scene_;
   const Elements &elements_;
   const Neighbours neighbours_;
+  std::array<std::vector<SamplePoint>, 4> points_; ///< of clouds: by quadrature, where none is asked for three
   std::vector<double> stiffness_;
   mutable std::vector<int> bounded_;    ///< per rod
   mutable std::vector<char> surprised_; ///< per rod: whether a watched pair touches
@@ -100,6 +104,17 @@ private:
   void expect(const Configuration &start, const Planes &way, bool all);
   void setStiffness(const State &state, const Configuration &start, const Planes &way, const Step &step);
   void bearAsDrawn(const Configuration &start, const std::vector<double> &load);
+  template <class Visit>
+  void visitCloud(const TouchingPair &p, const std::array<Vec3, 4> &x, double reach, Visit visit) const;
+  /// Spheres that belong to an edge: of its vertices the first, and the last where the rod ends there.
+  /// \return how many, with their parts of the edge and of the rod at rest [m]
+  int spheresOf(int rod, int edge, std::array<SamplePoint, 3> &out) const;
+  /// Of a point of an edge as drawn [m].
+  Vec3 drawnAt(int rod, int edge, double at) const {
+    const Rod &r = scene_.rods[std::size_t(rod)];
+    const std::size_t next = std::size_t(edge + 1) % r.position.size();
+    return (1 - at) * r.position[std::size_t(edge)] + at * r.position[next];
+  }
   /// No more than the distance of both edges.
   static double farApart(const std::array<Vec3, 4> &x) {
     return 0.5 * ((x[0] + x[1] - x[2] - x[3]).norm() - (x[1] - x[0]).norm() - (x[3] - x[2]).norm());
@@ -112,6 +127,7 @@ template <class Visit>
 void TouchingRods::visit(const TouchingPair &p, const std::array<Vec3, 4> &x, double reach, Visit visit) const {
   const double radii = radiiOf(p);
   if (farApart(x) > radii + reach) return;
+  if (isCloud(p)) return visitCloud(p, x, reach, visit);
   const double thinner = std::min(settings(p.rod).radius, settings(p.to_rod).radius),
                fine = std::sqrt(std::min(1.0, widthOf(p) / (0.2 * thinner)));
   for (const int side : {0, 1}) {
@@ -119,7 +135,7 @@ void TouchingRods::visit(const TouchingPair &p, const std::array<Vec3, 4> &x, do
     const int rod = side == 0 ? p.rod : p.to_rod, edge = side == 0 ? p.edge : p.to_edge;
     const double rest = elements_.restLength()[elements_.rods[std::size_t(rod)].slot(edge)];
     constexpr double most = 1000, alike = 1 - 1e-9; // edges whose lengths differ by rounding have as many
-    const int count = int(std::clamp(std::ceil(alike * rest / (0.5 * thinner * fine)), 1.0, most));
+    const int count = int(std::clamp(std::ceil(alike * rest / (thinner * fine / 3)), 1.0, most));
     const Vec3 along = x[own + 1] - x[own];
     const double spacing = along.norm() / count;
     for (int k = 0; k <= count;) {
@@ -158,6 +174,43 @@ void TouchingRods::visit(const TouchingPair &p, const std::array<Vec3, 4> &x, do
       t.inside = false;
       visit(t);
     }
+  }
+}
+
+/// Points of each edge against spheres of the other, W(|x - y| - radius of the sphere) by both of their weights over
+/// that radius.
+template <class Visit>
+void TouchingRods::visitCloud(const TouchingPair &p, const std::array<Vec3, 4> &x, double reach, Visit visit) const {
+  for (const int side : {0, 1}) {
+    const std::size_t own = std::size_t(2 * side), other = 2 - own;
+    const int rod = p.rodOf(side), edge = p.edgeOf(side), to_rod = p.rodOf(1 - side), to_edge = p.edgeOf(1 - side);
+    const double rest = elements_.restLength()[elements_.rods[std::size_t(rod)].slot(edge)];
+    const ContactSettings &spheres = settings(to_rod);
+    std::array<SamplePoint, 3> sphere;
+    const int count = spheresOf(to_rod, to_edge, sphere);
+    const std::vector<SamplePoint> &points = points_[std::size_t(settings(rod).quadrature)];
+    for (std::size_t k = 0; k < points.size(); ++k)
+      for (int n = 0; n < count; ++n) {
+        const SamplePoint &point = points[k], &at = sphere[std::size_t(n)];
+        const Vec3 from =
+            (1 - point.at) * x[own] + point.at * x[own + 1] - (1 - at.at) * x[other] - at.at * x[other + 1];
+        Touching t;
+        t.distance = from.norm();
+        t.gap = t.distance - spheres.radius;
+        if (!(t.gap < reach)) continue;
+        const double least = spheres.exclusion_ratio * spheres.radius + spheres.threshold;
+        if (rod == to_rod && (drawnAt(rod, edge, point.at) - drawnAt(to_rod, to_edge, at.at)).norm() < least) continue;
+        t.side = side;
+        t.sample = int(k) * 3 + n;
+        t.taken_off = t.inside = false;
+        t.weight = point.weight * rest * at.weight / spheres.radius;
+        t.normal = from / t.distance;
+        t.part[own] = 1 - point.at;
+        t.part[own + 1] = point.at;
+        t.part[other] = at.at - 1;
+        t.part[other + 1] = -at.at;
+        visit(t);
+      }
   }
 }
 

@@ -15,6 +15,14 @@ namespace tendril {
   {block ".bodies", KeyType::flag, "", "false", "whether it touches bodies that touch rods", anything, "", "true"},     \
   {block ".law", KeyType::word, "", "barrier", "barrier: never gives way; penalty: a spring over the depth", anything, \
    "barrier|penalty", "penalty"},                                                                                      \
+  {block ".collider", KeyType::word, "", "capsules",                                                                   \
+   "what other rods feel of it: its edges, or spheres of its radius about points; those only with law: penalty",       \
+   anything, "capsules|point_cloud", "point_cloud"},                                                                   \
+  {block ".cloud", KeyType::word, "", "vertices",                                                                      \
+   "points of a point cloud: the vertices, or so many Gauss points of each edge", anything, "vertices|1|2|3", "2"},    \
+  {block ".exclusion_ratio", KeyType::number, "", "1.5",                                                               \
+   "points of one rod nearer than so many radii, and the threshold, as drawn, do not touch: more than 1", positive, "", \
+   "2"},                                                                                                               \
   {block ".radius", KeyType::number, "m", "(of the section)",                                                          \
    "of the rod, where it touches; 0 only with law: penalty", not_negative, "", "0.01"},                                \
   {block ".distance", KeyType::number, "m", "(a fifth of the radius)",                                                 \

@@ -24,6 +24,12 @@ struct ContactSettings {
   /// Whether it touches bodies, of those that say the same.
   bool bodies = false;
   Law law = Law::barrier;
+  /// What other rods feel of it: its edges as capsules, or spheres of its radius about vertices or Gauss points of
+  /// edges.
+  bool point_cloud = false;
+  int cloud = 0; ///< Gauss points of an edge that are spheres; 0: the vertices
+  double exclusion_ratio =
+      1.5;             ///< points of one rod nearer than so many radii and the threshold, as drawn, do not touch
   double radius = 0;   ///< of the rod [m]
   double distance = 0; ///< width of the barrier [m]
   /// Of a barrier: force per length [N/m], 0: by the loads. Of a penalty: pressure over depth, per length of the rod
