@@ -396,7 +396,7 @@ double errorOfCrossedStrings(double width) {
     }
     return force;
   };
-  EXPECT_NEAR(forceAt(c + r, 0.02), 36.5510259800473, 1e-9); // the row, of hard contact
+  EXPECT_NEAR(forceAt(c + r, 0.02), 36.5510259800473, 2e-4 * 36.55); // the row, where all edges are stretched alike
   const double force = forceAt(c + 0.5 * apart, level);
   const std::unique_ptr<Term> contact = makeRodContact(sim.scene, *sim.elements);
   const Configuration end = configurationOf(sim.state, sim.scene, *sim.elements, 1);
