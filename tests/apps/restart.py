@@ -229,9 +229,17 @@ def automatic(tmp):
     random.seed(3)
     kills = 0
     for k in range(8):
+        begun = time.time()
         process = started(*options)
+
+        def wrote():  # a checkpoint of its own: that of before is moved away in a moment
+            try:
+                return os.path.getmtime(out + "/checkpoint.h5") >= begun and len(glob.glob(out + "/part_*")) == k
+            except OSError:
+                return False
+
         # Ended by itself where the machine was slow to look: then there is nothing more to kill.
-        until(lambda: process.poll() is not None or (os.path.exists(out + "/checkpoint.h5") and len(glob.glob(out + "/part_*")) == k), None)
+        until(lambda: process.poll() is not None or wrote(), None)
         time.sleep(random.uniform(0, 0.1))
         process.kill()
         text = process.communicate()[0]

@@ -302,8 +302,9 @@ TEST(Bodies, SpringsComeToTheWeldAsTheyStiffen) {
     for (int k = 1; k < 4; ++k) {
       // By 1/k; curved at the soft end. Newton's tolerance of 1e-6 of the load is below.
       EXPECT_NEAR(off[k - 1] / off[k], 10, 2.5) << dynamic << " " << off[k - 1] << " " << off[k];
-      // In statics a spring that is stiff beside the rod turns large trials away: by a factor of 1.5 for each of 10.
-      EXPECT_LE(iterations[k], 1 + iterations[0] * (dynamic ? 1.5 : std::pow(1.5, k))) << dynamic;
+      // In statics a spring that is stiff beside the rod turns large trials away: by a factor of 1.5 for each of 10,
+      // and one or two by what the dense kernels of a BLAS round otherwise (44 and 45 by two of them).
+      EXPECT_LE(iterations[k], 2 + iterations[0] * (dynamic ? 1.5 : std::pow(1.5, k))) << dynamic;
     }
     Simulation weld;
     runTo(weld, scene(0), settings);
