@@ -3,8 +3,8 @@
     import stability_rods
     rows = stability_rods.rows(tools)    # tools: what runs the program and writes scenes (run, Row, writeScene, ...)
 
-Short rows leave out what is known to miss its mark: held cords at 100 m/s, strings pressed in one step, a shaken box,
-tips against sides, the warning of long edges, weak barriers, and the time of rods apart.
+Short rows are a part of each, without what misses its mark: near-parallel cords at 100 m/s, slanted tips, weak barriers,
+and the time of rods apart.
 """
 import itertools
 import math
