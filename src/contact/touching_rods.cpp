@@ -174,12 +174,7 @@ double TouchingRods::freeFraction(const Configuration &from, const Configuration
   double free = 1;
   if (!isInRoom(from, to, 1, r)) {
     ++bounded_[std::size_t(r)];
-    double beyond = 1;
-    free = 0;
-    for (int k = 0; k < 6; ++k) {
-      const double middle = 0.5 * (free + beyond);
-      (isInRoom(from, to, middle, r) ? free : beyond) = middle;
-    }
+    free = largestPart([&](double part) { return isInRoom(from, to, part, r); });
   }
   for (const TouchingPair &p : pairs_.of({r, r + 1})) {
     const std::array<Vec3, 4> x = pointsOf(p, from);

@@ -18,6 +18,16 @@ struct SamplePoint {
 /// keep `spacing`.
 std::vector<SamplePoint> samplePoints(int quadrature, double longest_edge, double spacing);
 
+/// Largest 64th part of a way up to which a condition holds that holds where it begins.
+template <class Holds> double largestPart(Holds holds) {
+  double part = 0, beyond = 1;
+  for (int k = 0; k < 6; ++k) {
+    const double middle = 0.5 * (part + beyond);
+    (holds(middle) ? part : beyond) = middle;
+  }
+  return part;
+}
+
 /// That keeps what a rod feels of a surface the same wherever samples lie [m]: a tube of its radius against a surface
 /// that curves as much touches it along about twice this length.
 double sampleSpacing(const Shape &shape, const ContactSettings &contact);
