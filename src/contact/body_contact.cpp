@@ -123,7 +123,7 @@ public:
       s.points.clear();
       s.rounds = {};
       s.start = &start;
-      const double time = step.isStatic() ? 0 : step.time > state.time ? step.time - state.time : step.dt;
+      const double time = slidingTime(state, step);
       s.slides = contacts.settings().slides() && time > 0;
       s.sliding = {contacts.settings().fall_off_velocity * time, time};
       if (s.slides) s.points = slidingPoints(contacts, b, start);

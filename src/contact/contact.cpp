@@ -257,8 +257,7 @@ private:
 
   void beginSliding(const State &state, const Configuration &start, const Step &step, int r) {
     const ContactSettings &settings = scene_.rods[r].contact;
-    // Where a method asks for the forces of its start, no time has gone.
-    const double time = step.isStatic() ? 0 : step.time > state.time ? step.time - state.time : step.dt;
+    const double time = slidingTime(state, step);
     OfSliding &sliding = sliding_[r];
     sliding.anchored = settings.isAnchored(step.isStatic());
     sliding.rounds = {};

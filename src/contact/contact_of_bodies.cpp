@@ -1,6 +1,5 @@
 /// Contact of rigid bodies with rods and with each other: samples of the ones against the others as solids, with
 /// friction at their surfaces (docs/theory.md, Contact between rods).
-#include "tendril/contact/friction.hpp"
 #include "tendril/contact/touching_bodies.hpp"
 #include "tendril/coupling/couplings.hpp"
 #include "tendril/state/spin_stage.hpp"
@@ -9,18 +8,6 @@
 
 namespace tendril {
 namespace {
-
-/// A sample that slides along a body. The point where surfaces touch is carried by both.
-struct SlidingSample {
-  TouchingPair pair;
-  int side, sample;
-  CarriedPoint own, other;
-  SlidingPoint point;
-  SlidingPoint &slid() { return point; }
-  bool isSame(const SlidingSample &b) const {
-    return pair.number == b.pair.number && side == b.side && sample == b.sample;
-  }
-};
 
 class ContactOfBodies final : public Term {
 public:
@@ -37,11 +24,11 @@ public:
       pairs.push_back(p);
     }
     start_ = &start;
-    time_ = step.isStatic() ? 0 : step.time > state.time ? step.time - state.time : step.dt;
+    time_ = slidingTime(state, step);
     for (int r = 0; r < int(sliding_.size()) && slides_; ++r) {
       OfSliding &s = sliding_[std::size_t(r)];
       s = {};
-      if (time_ > 0) s.points = slidingSamples(start, r);
+      if (time_ > 0) s.points = slidingPairs(start, r);
     }
   }
   bool nearlyTouch(const TouchingPair &pair, const Configuration &c) const override {
@@ -63,7 +50,7 @@ public:
 
   double energy(const Configuration &c, int r) const override {
     double sum = normalEnergy(c, r);
-    for (const SlidingSample &p : sliding_[std::size_t(r)].points) sum += forceOn(p, c).value;
+    for (const SlidingPair &p : sliding_[std::size_t(r)].points) sum += forceOn(p, c).value;
     return sum;
   }
   double noise(const Configuration &c, int r, double) const override {
@@ -99,7 +86,7 @@ public:
         });
         for (; sliding != end && sliding->pair.number == p.number; ++sliding) { // both lists are in one order
           any = true;
-          addFriction(*sliding, c, kind, d);
+          addFriction(*sliding, forceOn(*sliding, c), c, kind, d);
         }
         if (any) addPair(elements_, p, first_number_ + p.number, d, kind, out);
       }
@@ -114,9 +101,10 @@ public:
         const GapLaw law = bodies_.lawOf(p)(t.gap);
         const Collider::Pose pose = bodies_.poseOf(p.body(t.solid()), c);
         const Vec3 normal = pose.rotation * bodies_.solidOf(p.body(t.solid())).at(t.local).gradient;
+        const Vec3 arm = armTo(p, t, c);
         double closing = 0;
         for (const int side : {0, 1}) {
-          const OfPair::BySide by = bySide(p, t, side, c);
+          const OfPair::BySide by = bySide(p, t, side, arm, c);
           for (int v = 0; v < (p.isBody(side) ? 6 : OfPair::half); ++v) {
             const auto [slot, a] = p.place(side, v);
             closing += normal.dot(by.col(v)) * increment[a][slot];
@@ -132,13 +120,13 @@ public:
   double renew(const Configuration &iterate, int r) override {
     if (!slides_ || time_ == 0) return 0;
     OfSliding &s = sliding_[std::size_t(r)];
-    return renewSliding(s.points, slidingSamples(iterate, r), s.rounds,
-                        [&](const SlidingSample &p) { return forceOn(p, iterate); });
+    return renewSliding(s.points, slidingPairs(iterate, r), s.rounds,
+                        [&](const SlidingPair &p) { return forceOn(p, iterate); });
   }
 
 private:
   struct OfSliding {
-    std::vector<SlidingSample> points;
+    std::vector<SlidingPair> points;
     SlidingRounds rounds;
   };
   const Scene &scene_;
@@ -164,10 +152,12 @@ private:
     return pose.fromLocal(t.local) - c.positionAt(p.slot[std::size_t(2 * t.solid())]);
   }
   /// What the sample's place as the solid sees it, exp(-d)(x - p), changes by the variables of one of both.
-  OfPair::BySide bySide(const TouchingPair &p, const TouchingSolid &t, int side, const Configuration &c) const {
+  /// \param arm from the centre of mass of the solid to the sample [m]
+  OfPair::BySide bySide(const TouchingPair &p, const TouchingSolid &t, int side, const Vec3 &arm,
+                        const Configuration &c) const {
     if (side == t.side) return byPoint(p, side, bodies_.pointOf(p, t), c);
     OfPair::BySide by;
-    by << -Mat3::Identity(), crossMatrix<double>(armTo(p, t, c)), Vec3::Zero();
+    by << -Mat3::Identity(), crossMatrix<double>(arm), Vec3::Zero();
     return by;
   }
 
@@ -179,9 +169,9 @@ private:
     const Mat3 q = bodies_.poseOf(p.body(t.solid()), c).rotation;
     const Distance distance = bodies_.solidOf(p.body(t.solid())).at(t.local);
     const GapLaw law = bodies_.lawOf(p)(t.gap);
-    const Vec3 normal = q * distance.gradient, g = t.weight * law.slope * normal;
+    const Vec3 normal = q * distance.gradient, g = t.weight * law.slope * normal, arm = armTo(p, t, c);
     Eigen::Matrix<double, 3, OfPair::size> by;
-    by << bySide(p, t, 0, c), bySide(p, t, 1, c);
+    by << bySide(p, t, 0, arm, c), bySide(p, t, 1, arm, c);
     d.gradient += by.transpose() * g;
     if (kind == HessianKind::none) return;
     Mat3 h = t.weight * law.curvature * normal * normal.transpose();
@@ -190,7 +180,7 @@ private:
     d.hessian += by.transpose() * h * by;
     if (!exact) return;
     addCurvature(p, t.side, bodies_.pointOf(p, t), g, c, d);
-    d.hessian.block<3, 3>(other + 3, other + 3) += curvatureOfArm(g, armTo(p, t, c));
+    d.hessian.block<3, 3>(other + 3, other + 3) += curvatureOfArm(g, arm);
     Eigen::Matrix<double, 3, OfPair::size> moved = Eigen::Matrix<double, 3, OfPair::size>::Zero(); // dx - dp
     moved.middleCols<OfPair::half>(own) = by.middleCols<OfPair::half>(own);
     moved.middleCols<3>(other) = -Mat3::Identity();
@@ -199,37 +189,21 @@ private:
     d.hessian.middleRows<3>(other + 3) += turned.transpose();
   }
 
-  void addFriction(const SlidingSample &p, const Configuration &c, HessianKind kind, OfPair &d) const {
-    const SlidingForce force = forceOn(p, c);
-    Eigen::Matrix<double, 3, OfPair::size> by;
-    for (const int side : {0, 1}) {
-      const bool own = side == p.side;
-      by.middleCols<OfPair::half>(OfPair::half * side) =
-          (own ? 1 : -1) * byPoint(p.pair, side, own ? p.own : p.other, c);
-      if (kind != HessianKind::none)
-        addCurvature(p.pair, side, own ? p.own : p.other, (own ? 1 : -1) * force.gradient, c, d);
-    }
-    d.gradient += by.transpose() * force.gradient;
-    if (kind != HessianKind::none) d.hessian += by.transpose() * force.hessian * by;
-  }
-
-  SlidingForce forceOn(const SlidingSample &p, const Configuration &c) const {
-    const ContactSettings both = bothSlide(bodies_.settingsOf(p.pair, 0), bodies_.settingsOf(p.pair, 1));
-    return slidingForce(p.point, both, {both.fall_off_velocity * time_, time_},
-                        wayBetween(p.pair, p.side, p.own, p.other, c) - p.point.start);
+  SlidingForce forceOn(const SlidingPair &p, const Configuration &c) const {
+    return frictionOn(p, bodies_.settingsOf(p.pair, 0), bodies_.settingsOf(p.pair, 1), time_, c);
   }
 
   /// What touches at a configuration. The point is in the middle between both surfaces, or on the axis of a rod whose
   /// friction acts there.
-  std::vector<SlidingSample> slidingSamples(const Configuration &c, int r) const {
-    std::vector<SlidingSample> points;
+  std::vector<SlidingPair> slidingPairs(const Configuration &c, int r) const {
+    std::vector<SlidingPair> points;
     bodies_.visit(c, {r, r + 1}, [&](const TouchingPair &pair, const TouchingSolid &t) {
       const double pressing = -t.weight * bodies_.lawOf(pair)(t.gap).slope;
       if (!(pressing > 0)) return;
       const int solid = pair.body(t.solid());
       const Collider::Pose pose = bodies_.poseOf(solid, c);
       const Vec3 steep = pose.rotation * bodies_.solidOf(solid).at(t.local).gradient, normal = steep.normalized();
-      SlidingSample p{pair, t.side, t.sample, bodies_.pointOf(pair, t), {}, {}};
+      SlidingPair p{pair, t.side, t.sample, bodies_.pointOf(pair, t), {}, {}};
       const bool on_axis = !pair.isBody(t.side) && (!bodies_.settingsOf(pair, t.side).friction_at_surface ||
                                                     scene_.rods[std::size_t(pair.rodOf(t.side))].material.isCable());
       const double out = on_axis ? 0 : t.radius + 0.5 * t.gap;

@@ -80,6 +80,26 @@ void addCurvature(const TouchingPair &p, int side, const CarriedPoint &point, co
   out.hessian.block<half, half>(first, first) += edge.transpose() * bent.hessian * edge;
 }
 
+SlidingForce frictionOn(const SlidingPair &p, const ContactSettings &one, const ContactSettings &other, double time,
+                        const Configuration &c) {
+  const ContactSettings both = bothSlide(one, other);
+  return slidingForce(p.point, both, {both.fall_off_velocity * time, time},
+                      wayBetween(p.pair, p.side, p.own, p.other, c) - p.point.start);
+}
+
+void addFriction(const SlidingPair &p, const SlidingForce &force, const Configuration &c, HessianKind kind,
+                 OfPair &out) {
+  Eigen::Matrix<double, 3, OfPair::size> by;
+  for (const int side : {0, 1}) {
+    const bool own = side == p.side;
+    const double sign = own ? 1 : -1;
+    by.middleCols<half>(half * side) = sign * byPoint(p.pair, side, own ? p.own : p.other, c);
+    if (kind != HessianKind::none) addCurvature(p.pair, side, own ? p.own : p.other, sign * force.gradient, c, out);
+  }
+  out.gradient += by.transpose() * force.gradient;
+  if (kind != HessianKind::none) out.hessian += by.transpose() * force.hessian * by;
+}
+
 void addPair(const Elements &elements, const TouchingPair &p, int number, const OfPair &d, HessianKind kind,
              Derivatives &out) {
   for (const int side : {0, 1})

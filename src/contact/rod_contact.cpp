@@ -1,6 +1,5 @@
 /// Contact of rods with each other and with themselves: samples along each edge against the other as a capsule, both
 /// ways at half their weight, with friction at their surfaces (docs/theory.md, Contact between rods).
-#include "tendril/contact/friction.hpp"
 #include "tendril/contact/pair_derivatives.hpp"
 #include "tendril/contact/touching_rods.hpp"
 #include "tendril/coupling/couplings.hpp"
@@ -9,19 +8,6 @@
 
 namespace tendril {
 namespace {
-
-/// A sample of one edge that slides along the other. The point where surfaces touch is carried by the frames of both,
-/// so that friction turns them and makes no couple of its own.
-struct SlidingPair {
-  TouchingPair pair;
-  int side, sample;
-  CarriedPoint own, other; ///< of the sample's edge; of the other
-  SlidingPoint point;
-  SlidingPoint &slid() { return point; }
-  bool isSame(const SlidingPair &b) const {
-    return pair.number == b.pair.number && side == b.side && sample == b.sample;
-  }
-};
 
 class RodContact final : public Term {
 public:
@@ -33,7 +19,7 @@ public:
                     std::vector<TouchingPair> &pairs) override {
     rods_.find(state, start, way, step, room);
     start_ = &start;
-    time_ = step.isStatic() ? 0 : step.time > state.time ? step.time - state.time : step.dt;
+    time_ = slidingTime(state, step);
     for (int r = 0; r < int(sliding_.size()) && slides_; ++r) {
       OfSliding &s = sliding_[std::size_t(r)];
       s = {};
@@ -184,23 +170,8 @@ private:
     d.hessian -= t.weight * law.slope / (t.distance * other.squaredNorm()) * part * part.transpose();
   }
 
-  static void addFriction(const SlidingPair &p, const SlidingForce &force, const Configuration &c, HessianKind kind,
-                          OfPair &d) {
-    Eigen::Matrix<double, 3, OfPair::size> by;
-    for (const int side : {0, 1}) {
-      const bool own = side == p.side;
-      const double sign = own ? 1 : -1;
-      by.middleCols<OfPair::half>(OfPair::half * side) = sign * byPoint(p.pair, side, own ? p.own : p.other, c);
-      if (kind != HessianKind::none) addCurvature(p.pair, side, own ? p.own : p.other, sign * force.gradient, c, d);
-    }
-    d.gradient += by.transpose() * force.gradient;
-    if (kind != HessianKind::none) d.hessian += by.transpose() * force.hessian * by;
-  }
-
   SlidingForce forceOn(const SlidingPair &p, const Configuration &c) const {
-    const ContactSettings both = bothSlide(rods_.settings(p.pair.rod), rods_.settings(p.pair.to_rod));
-    return slidingForce(p.point, both, {both.fall_off_velocity * time_, time_},
-                        wayBetween(p.pair, p.side, p.own, p.other, c) - p.point.start);
+    return frictionOn(p, rods_.settings(p.pair.rod), rods_.settings(p.pair.to_rod), time_, c);
   }
 
   /// What touches at a configuration. The point is in the middle between both surfaces.

@@ -7,6 +7,13 @@
 
 namespace tendril {
 
+static double distanceAt(const Shape &shape, const Vec3 &x) {
+  const double *const point[3] = {&x[0], &x[1], &x[2]};
+  double distance;
+  shape.distances(point, 1, &distance);
+  return distance;
+}
+
 TouchingBodies::TouchingBodies(const Scene &scene, const Elements &elements)
     : scene_(scene), elements_(elements), solids_(scene.bodies.size()), bounded_(scene.rods.size(), 0) {
   for (std::size_t b = 0; b < solids_.size(); ++b) {
@@ -38,7 +45,7 @@ void TouchingBodies::leaveOut() {
       const Vec3 x = body.rotation.transpose() * (rod.position[std::size_t(v)] - body.position);
       return arc >= least && solidOf(b).at(x).value > radius + width;
     };
-    std::vector<std::array<int, 2>> &out = tied_[{r, b}];
+    std::vector<int> &out = tied_[{r, b}];
     for (const int step : {1, -1}) {
       double arc = 0;
       for (int v = vertex, n = 0; n < range.edges && !hasLeft(v, arc); ++n) {
@@ -48,7 +55,7 @@ void TouchingBodies::leaveOut() {
           next = (next + range.vertices) % range.vertices;
         } else if (edge < 0 || edge >= range.edges)
           break;
-        out.push_back({edge, edge + 1});
+        out.push_back(edge);
         arc += elements_.restLength()[range.slot(edge)];
         v = next;
       }
@@ -65,8 +72,7 @@ bool TouchingBodies::mayTouch(int r, int edge, int b) const {
   const ContactSettings &rod = scene_.rods[std::size_t(r)].contact, &body = scene_.bodies[std::size_t(b)].contact;
   if (!rod.touchesBodies() || !solids_[std::size_t(b)].shape || rod.isApartFrom(body)) return false;
   const auto tied = tied_.find({r, b});
-  return tied == tied_.end() || std::none_of(tied->second.begin(), tied->second.end(),
-                                             [&](const auto &edges) { return edge >= edges[0] && edge < edges[1]; });
+  return tied == tied_.end() || std::find(tied->second.begin(), tied->second.end(), edge) == tied->second.end();
 }
 
 bool TouchingBodies::mayTouch(int a, int b) const {
@@ -106,10 +112,7 @@ bool TouchingBodies::isAway(const TouchingPair &p, int side, const Side &samples
   const Vec3 middle = samples.points ? Vec3(samples.first + 0.5 * samples.along) : samples.first;
   const double size =
       samples.points ? 0.5 * samples.along.norm() + samples.radius : solids_[std::size_t(p.body(side))].reach;
-  const double *const point[3] = {&middle[0], &middle[1], &middle[2]};
-  double distance;
-  solidOf(p.body(1 - side)).distances(point, 1, &distance);
-  return distance > size + reach;
+  return distanceAt(solidOf(p.body(1 - side)), middle) > size + reach;
 }
 
 /// Neither of rods nor of bodies beside one that it may have a pair with is far from where all were looked for.
@@ -182,11 +185,7 @@ void TouchingBodies::take() const {
     const double room = body_room_[std::size_t(b)];
     auto isNear = [&](const Vec3 &x, double size) {
       if ((x - centre).norm() > solid.reach + size + room) return false;
-      const Vec3 local = pose.toLocal(x);
-      const double *const point[3] = {&local[0], &local[1], &local[2]};
-      double distance;
-      solid.shape->distances(point, 1, &distance);
-      return distance <= size + room;
+      return distanceAt(*solid.shape, pose.toLocal(x)) <= size + room;
     };
     for (int r = 0; r < int(scene_.rods.size()); ++r) {
       const ContactSettings &contact = scene_.rods[std::size_t(r)].contact;
@@ -225,13 +224,13 @@ void TouchingBodies::take() const {
 
 /// As of obstacles (RodContacts).
 std::span<const SamplePoint> TouchingBodies::pointsFor(int r, int b) const {
+  std::vector<SamplePoint> &found = points_[{r, b}];
+  if (!found.empty()) return found;
   const ContactSettings &contact = scene_.rods[std::size_t(r)].contact;
   const RodRange &rod = elements_.rods[std::size_t(r)];
   double longest = 0;
   for (int s = rod.first_slot; s < rod.edgeEnd(); ++s) longest = std::max(longest, elements_.restLength()[s]);
-  const double spacing = sampleSpacing(solidOf(b), contact);
-  std::vector<SamplePoint> points = samplePoints(contact.quadrature, longest, spacing);
-  return points_.try_emplace({contact.quadrature, int(points.size())}, std::move(points)).first->second;
+  return found = samplePoints(contact.quadrature, longest, sampleSpacing(solidOf(b), contact));
 }
 
 /// Of an edge and a body as wide as that of the rod, with what presses on either; of two bodies as wide as both in the
@@ -322,10 +321,7 @@ double TouchingBodies::freeFraction(const Configuration &from, const Configurati
       if (isAway(p, side, before, longest + 0.2 * width)) continue;
       for (int k = 0; k < before.count; ++k) {
         const Vec3 x = before.at(k), way = after.at(k) - x;
-        const double *const point[3] = {&x[0], &x[1], &x[2]};
-        double distance;
-        solidOf(body).distances(point, 1, &distance);
-        const double gap = distance - before.radiusAt(k);
+        const double gap = distanceAt(solidOf(body), x) - before.radiusAt(k);
         if (gap - wall > way.norm() + 0.2 * width) continue;
         free = std::min(free, freeWay(solidOf(body), x, way, before.radiusAt(k), gap, wall, width));
       }

@@ -38,6 +38,12 @@ struct Sliding {
   bool holds = false; ///< whether nothing slides
 };
 
+/// That a step takes from a state [s]; where a method asks for the forces of its start, no time has gone, and its own
+/// length counts. 0 in statics.
+inline double slidingTime(const State &state, const Step &step) {
+  return step.isStatic() ? 0 : step.time > state.time ? step.time - state.time : step.dt;
+}
+
 /// Rounds of a step, in each of which normal forces are taken anew.
 struct SlidingRounds {
   bool swings = false; ///< whether they go to and fro, and are led to their middle

@@ -2,7 +2,7 @@
 /// \file pair_derivatives.hpp
 /// Derivatives of what two edges, an edge and a body, or two bodies do to each other.
 
-#include "tendril/energy/term.hpp"
+#include "tendril/contact/friction.hpp"
 
 namespace tendril {
 
@@ -32,6 +32,25 @@ Vec3 armOf(const TouchingPair &pair, int side, const CarriedPoint &point, const 
 /// From the second point to the first, relative to what was so before.
 Vec3 wayBetween(const TouchingPair &pair, int side, const CarriedPoint &own, const CarriedPoint &other,
                 const Configuration &c);
+
+/// A sample of the one that slides along the other. The point where surfaces touch is carried by both, so that friction
+/// turns them and makes no couple of its own.
+struct SlidingPair {
+  TouchingPair pair;
+  int side, sample;        ///< which of the pair has it, and which of its samples
+  CarriedPoint own, other; ///< of the sample's side; of the other
+  SlidingPoint point;
+  SlidingPoint &slid() { return point; }
+  bool isSame(const SlidingPair &b) const {
+    return pair.number == b.pair.number && side == b.side && sample == b.sample;
+  }
+};
+/// What friction does to it, by how both of its sides slide. \param time that the step has taken [s]
+SlidingForce frictionOn(const SlidingPair &p, const ContactSettings &one, const ContactSettings &other, double time,
+                        const Configuration &c);
+/// Adds its derivatives by the variables of the pair.
+void addFriction(const SlidingPair &p, const SlidingForce &force, const Configuration &c, HessianKind kind,
+                 OfPair &out);
 
 /// Adds derivatives of a pair to both of the gradients and to the blocks: what each side has with itself goes to its
 /// own rod, of an edge by its first vertex, its vector and its twist, of a body to BodyPair; the rest to the block of

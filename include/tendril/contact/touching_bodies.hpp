@@ -97,12 +97,13 @@ private:
   const Scene &scene_;
   const Elements &elements_;
   std::vector<Solid> solids_;
-  /// Edges of a rod, [begin, end), that do not touch a body which the rod is tied to.
-  std::map<std::pair<int, int>, std::vector<std::array<int, 2>>> tied_;
+  /// Edges of a rod that do not touch a body which the rod is tied to.
+  std::map<std::pair<int, int>, std::vector<int>> tied_;
   std::vector<std::pair<int, int>> jointed_;    ///< bodies that a joint ties to each other, the smaller number first
   std::vector<double> load_;                    ///< per rod [N]
   std::map<std::pair<int, int>, double> borne_; ///< part of its stiffness that loads press against as drawn
-  mutable std::map<std::pair<int, int>, std::vector<SamplePoint>> points_; ///< by quadrature and their number
+  mutable std::map<std::pair<int, int>, std::vector<SamplePoint>>
+      points_; ///< of the edges of a rod, by it and the body
   // What find and cover set:
   mutable bool static_ = false;
   mutable Configuration start_;
