@@ -137,6 +137,17 @@ Scene touchingScene() {
   return scene;
 }
 
+/// What rods do to each other at a configuration: the gradient of the energy of their contact alone.
+Planes pushesAmongRods(const Simulation &sim, const Configuration &c) {
+  const std::unique_ptr<Term> contact = makeRodContact(sim.scene, *sim.elements);
+  std::vector<TouchingPair> pairs;
+  contact->findTouching(sim.state, c, sim.dofs.makePlanes(), {}, 1, pairs);
+  Derivatives d(sim.elements->slots, true);
+  d.blocks.setTouching(pairs.size());
+  contact->addBetween(c, sim.dofs.all(), d, HessianKind::none);
+  return d.gradient;
+}
+
 double dotAll(const Simulation &sim, const Planes &a, const Planes &b) {
   double sum = 0;
   for (const RodRange &rod : sim.elements->rods) sum += dot(rod, a, b);
@@ -187,19 +198,13 @@ TEST(RodContact, LeavesMomentaAlone) {
   Simulation sim;
   EXPECT_PETSC(sim.setUp(touchingScene(), dynamics(0.01, 1)));
   EXPECT_PETSC(sim.solver.begin(sim.state, TimeLoop::stepOf(dynamics(0.01, 1), sim.state, 0.01)));
-  const std::unique_ptr<Term> contact = makeRodContact(sim.scene, *sim.elements);
   const Configuration c = configurationOf(sim.state, sim.scene, *sim.elements, 0);
-  const Planes still = sim.dofs.makePlanes();
-  std::vector<TouchingPair> pairs;
-  contact->findTouching(sim.state, c, still, {}, 1, pairs);
-  Derivatives d(sim.elements->slots, true);
-  d.blocks.setTouching(pairs.size());
-  contact->addBetween(c, {0, 4}, d, HessianKind::exact);
+  const Planes pushes = pushesAmongRods(sim, c);
   Vec3 force = Vec3::Zero(), moment = Vec3::Zero();
   double size = 0, size_of_moment = 0;
   for (int v = 0; v < sim.elements->vertices(); ++v) {
     const int s = sim.elements->vertex_slot[std::size_t(v)];
-    const Vec3 f = d.gradient.vector(0, s), m = c.positionAt(s).cross(f);
+    const Vec3 f = pushes.vector(0, s), m = c.positionAt(s).cross(f);
     force += f;
     moment += m;
     size += f.norm();
@@ -332,15 +337,9 @@ TEST(RodContact, ATipFeelsASideEvenly) {
     for (Rod &rod : scene.rods) rod.contact.stiffness = 1e3;
     Simulation sim;
     EXPECT_PETSC(sim.setUp(scene, dynamics(0.01, 1)));
-    const std::unique_ptr<Term> contact = makeRodContact(sim.scene, *sim.elements);
-    const Configuration c = configurationOf(sim.state, sim.scene, *sim.elements, 0);
-    std::vector<TouchingPair> pairs;
-    contact->findTouching(sim.state, c, sim.dofs.makePlanes(), {}, 1, pairs);
-    Derivatives d(sim.elements->slots, true);
-    d.blocks.setTouching(pairs.size());
-    contact->addBetween(c, {0, 2}, d, HessianKind::none);
+    const Planes pushes = pushesAmongRods(sim, configurationOf(sim.state, sim.scene, *sim.elements, 0));
     Vec3 force = Vec3::Zero();
-    for (int v = 0; v < 13; ++v) force += d.gradient.vector(0, sim.elements->vertex_slot[std::size_t(v)]);
+    for (int v = 0; v < 13; ++v) force += pushes.vector(0, sim.elements->vertex_slot[std::size_t(v)]);
     EXPECT_GT(force[0], 1e-3) << bent;
     EXPECT_LT(std::abs(force[1]), 1e-10 * force[0]) << bent;
   }
@@ -398,15 +397,9 @@ double errorOfCrossedStrings(double width) {
   };
   EXPECT_NEAR(forceAt(c + r, 0.02), 36.5510259800473, 2e-4 * 36.55); // the row, where all edges are stretched alike
   const double force = forceAt(c + 0.5 * apart, level);
-  const std::unique_ptr<Term> contact = makeRodContact(sim.scene, *sim.elements);
-  const Configuration end = configurationOf(sim.state, sim.scene, *sim.elements, 1);
-  std::vector<TouchingPair> pairs;
-  contact->findTouching(sim.state, end, sim.dofs.makePlanes(), {}, 1, pairs);
-  Derivatives d(sim.elements->slots, true);
-  d.blocks.setTouching(pairs.size());
-  contact->addBetween(end, {0, 2}, d, HessianKind::none);
+  const Planes pushes = pushesAmongRods(sim, configurationOf(sim.state, sim.scene, *sim.elements, 1));
   double pressing = 0;
-  for (std::size_t v = 0; v < along.size(); ++v) pressing += d.gradient.vector(0, sim.elements->vertex_slot[v])[2];
+  for (std::size_t v = 0; v < along.size(); ++v) pressing += pushes.vector(0, sim.elements->vertex_slot[v])[2];
   return std::abs(pressing / force - 1);
 }
 
