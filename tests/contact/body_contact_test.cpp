@@ -10,8 +10,6 @@
 namespace tendril::test {
 namespace {
 
-constexpr double earth = 9.81;
-
 Collider floor() {
   Collider floor;
   floor.name = "floor";

@@ -12,12 +12,8 @@ using D7 = Dual<7>;
 
 Vector3<D7> asDual(const Vec3 &v) { return {D7(v[0]), D7(v[1]), D7(v[2])}; }
 
-/// Turned by the first three variables as a rotation vector, up to second order.
-Vector3<D7> turned(const Vec3 &v) {
-  const Vector3<D7> spin(D7::variable(0, 0), D7::variable(0, 1), D7::variable(0, 2));
-  const Vector3<D7> once = spin.cross(asDual(v)), twice = spin.cross(once);
-  return asDual(v) + once + twice * D7(0.5);
-}
+/// Turned by the first three variables.
+Vector3<D7> spun(const Vec3 &v) { return turnedBy<7>(v, 0); }
 
 /// An edge whose vector changes by the next three variables, and whose twist by the last.
 FrameOf<D7> moved(const Frame &f) {
@@ -33,9 +29,9 @@ template <Measure measure> void expectMatch(RandomCell c, int frame) {
   turns.length = 1;
   c.cell.weight[frame] = 0;
   c.cell.free = {frame == 0 ? 0.0 : 1.0, frame == 0 ? 1.0 : 0.0}; // as cells have it; both turn all the same
-  const FrameOf<D7> joint{turned(turns.tangent), turned(turns.director), D7(1.0)}, edge = moved(frame == 0 ? c.f1 : c.f0);
+  const FrameOf<D7> joint{spun(turns.tangent), spun(turns.director), D7(1.0)}, edge = moved(frame == 0 ? c.f1 : c.f0);
   const D7 exact = frame == 0 ? cellEnergy<measure>(joint, edge, cast<D7>(c.cell))
-                             : cellEnergy<measure>(edge, joint, cast<D7>(c.cell));
+                              : cellEnergy<measure>(edge, joint, cast<D7>(c.cell));
   const JointCellDerivatives d = jointCellDerivatives<measure>(c.f0, c.f1, c.cell, frame);
   Eigen::Matrix<double, 7, 1> gradient;
   gradient << d.spin, d.edge;

@@ -10,14 +10,7 @@ namespace {
 
 using D12 = Dual<12>;
 
-Vector3<D12> asDual(const Vec3 &v) { return {D12(v[0]), D12(v[1]), D12(v[2])}; }
-
-/// Turned by three variables as a rotation vector, up to second order.
-Vector3<D12> turned(const Vec3 &v, int first) {
-  const Vector3<D12> spin(D12::variable(0, first), D12::variable(0, first + 1), D12::variable(0, first + 2));
-  const Vector3<D12> once = spin.cross(asDual(v)), twice = spin.cross(once);
-  return asDual(v) + once + twice * D12(0.5);
-}
+Vector3<D12> turned(const Vec3 &v, int first) { return turnedBy<12>(v, first); }
 Vector3<D12> moved(const Vec3 &v, int first) {
   return {D12::variable(v[0], first), D12::variable(v[1], first + 1), D12::variable(v[2], first + 2)};
 }

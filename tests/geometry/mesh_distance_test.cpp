@@ -199,7 +199,7 @@ TEST(MeshDistance, IsThatOfTheNearestOfAllTriangles) {
   EXPECT_GT(mesh.nearest(Vec3::Zero()).value, 0.69) << "a hole is outside";
 }
 
-std::string messageOf(const TriangleMesh &m, double cell = 0) {
+std::string messageOfMesh(const TriangleMesh &m, double cell = 0) {
   try {
     makeMesh(m, cell);
   } catch (const std::invalid_argument &error) {
@@ -212,28 +212,29 @@ TEST(MeshDistance, NamesWhatIsWrongWithAMesh) {
   const TriangleMesh good = cubes(1, all);
   TriangleMesh m = good;
   m.triangles.pop_back();
-  EXPECT_NE(messageOf(m).find("the surface is not closed"), std::string::npos) << messageOf(m);
+  EXPECT_NE(messageOfMesh(m).find("the surface is not closed"), std::string::npos) << messageOfMesh(m);
   m = good;
   std::swap(m.triangles[3][0], m.triangles[3][1]);
-  EXPECT_NE(messageOf(m).find("runs the same way in triangles"), std::string::npos) << messageOf(m);
+  EXPECT_NE(messageOfMesh(m).find("runs the same way in triangles"), std::string::npos) << messageOfMesh(m);
   m = good;
   for (auto &t : m.triangles) std::swap(t[0], t[1]);
-  EXPECT_EQ(messageOf(m), "the mesh is inside out at triangle 0: its piece has the volume -1 m^3");
+  EXPECT_EQ(messageOfMesh(m), "the mesh is inside out at triangle 0: its piece has the volume -1 m^3");
   m = good;
   m.vertices[2][1] = NAN;
-  EXPECT_EQ(messageOf(m).find("vertex 2 of the mesh is at ("), 0u) << messageOf(m);
+  EXPECT_EQ(messageOfMesh(m).find("vertex 2 of the mesh is at ("), 0u) << messageOfMesh(m);
   m = good;
   m.triangles[4][1] = 8;
-  EXPECT_EQ(messageOf(m), "triangle 4 of the mesh has vertex 8 of 8");
+  EXPECT_EQ(messageOfMesh(m), "triangle 4 of the mesh has vertex 8 of 8");
   m = good;
   m.triangles[4][1] = m.triangles[4][0];
-  EXPECT_EQ(messageOf(m).find("triangle 4 ("), 0u) << messageOf(m);
-  EXPECT_NE(messageOf(m).find("has no area"), std::string::npos) << messageOf(m);
+  EXPECT_EQ(messageOfMesh(m).find("triangle 4 ("), 0u) << messageOfMesh(m);
+  EXPECT_NE(messageOfMesh(m).find("has no area"), std::string::npos) << messageOfMesh(m);
   m = cubes(2, [](int i, int j, int k) { return i == j && j == k; });
-  EXPECT_NE(messageOf(m).find("joins sheets at triangles"), std::string::npos) << messageOf(m);
-  EXPECT_EQ(messageOf(TriangleMesh{}), "the mesh has no triangles");
-  EXPECT_EQ(messageOf(good, -1), "the cell of a mesh is -1 m");
-  EXPECT_EQ(messageOf(good, 1e-4).find("a cell of 0.0001 m divides the mesh by 1.00"), 0u) << messageOf(good, 1e-4);
+  EXPECT_NE(messageOfMesh(m).find("joins sheets at triangles"), std::string::npos) << messageOfMesh(m);
+  EXPECT_EQ(messageOfMesh(TriangleMesh{}), "the mesh has no triangles");
+  EXPECT_EQ(messageOfMesh(good, -1), "the cell of a mesh is -1 m");
+  EXPECT_EQ(messageOfMesh(good, 1e-4).find("a cell of 0.0001 m divides the mesh by 1.00"), 0u)
+      << messageOfMesh(good, 1e-4);
 }
 
 TEST(MeshDistance, TakesPiecesAndHollows) {
@@ -339,8 +340,8 @@ TEST(MeshShape, RefusesWhatIsThinnerThanTwoCells) {
   // A block of 0.8 with a fin of 0.1 on it.
   auto finned = [](int i, int j, int k) { return i < 8 && j < 8 && (k < 8 || j == 4); };
   const TriangleMesh m = cubes(16, Vec3(0.1, 0.1, 0.1), finned);
-  EXPECT_EQ(messageOf(m, 0.05), "made");
-  const std::string message = messageOf(m, 0.09);
+  EXPECT_EQ(messageOfMesh(m, 0.05), "made");
+  const std::string message = messageOfMesh(m, 0.09);
   double thick = 0, x = 0, y = 0, z = 0, cell = 0;
   ASSERT_EQ(
       std::sscanf(message.c_str(),
@@ -353,9 +354,9 @@ TEST(MeshShape, RefusesWhatIsThinnerThanTwoCells) {
   EXPECT_NEAR(cell, 0.05, 1e-5);
   EXPECT_NEAR(y, 0.45, 0.0501); // on one of the sides
   EXPECT_GT(z, 0.8);
-  EXPECT_EQ(messageOf(m, cell), "made");
-  EXPECT_NE(messageOf(cubes(1, Vec3(1, 1, 0.001), all)), "made") << "a sheet that no node is in";
-  EXPECT_EQ(messageOf(cubes(7, plateWithHole), 0.5), "made");
+  EXPECT_EQ(messageOfMesh(m, cell), "made");
+  EXPECT_NE(messageOfMesh(cubes(1, Vec3(1, 1, 0.001), all)), "made") << "a sheet that no node is in";
+  EXPECT_EQ(messageOfMesh(cubes(7, plateWithHole), 0.5), "made");
 }
 
 TEST(MeshShape, HasHoles) {

@@ -17,7 +17,7 @@ Scene smoothSwing() {
   return clampedScene(rod);
 }
 
-LoopSettings with(const std::string &integrator, double dt, double t_end) {
+LoopSettings smoothly(const std::string &integrator, double dt, double t_end) {
   LoopSettings s = dynamics(dt, t_end);
   s.integrator.name = integrator;
   s.estimate_error = true;
@@ -26,7 +26,7 @@ LoopSettings with(const std::string &integrator, double dt, double t_end) {
 
 /// Runs on from a state; returns the sum of the estimates.
 double runOn(Simulation &sim, const std::string &integrator, double dt, double t_end) {
-  const LoopSettings settings = with(integrator, dt, t_end);
+  const LoopSettings settings = smoothly(integrator, dt, t_end);
   TimeLoop loop(sim.solver, settings);
   bool finished = false;
   double estimate = 0;
@@ -43,7 +43,7 @@ double runOn(Simulation &sim, const std::string &integrator, double dt, double t
 }
 
 /// Distance of two states as the estimate has it: root mean square over vertices and edges, over the length of the rod.
-double apart(const State &a, const State &b) {
+double farApart(const State &a, const State &b) {
   const auto frame = [](const State &s, int e) {
     return Frame{(s.position[e + 1] - s.position[e]).normalized(), s.director[e], 1};
   };
@@ -58,7 +58,7 @@ double apart(const State &a, const State &b) {
 /// same method.
 double ratio(const std::string &integrator, double time, double h, double growth) {
   Simulation sim;
-  EXPECT_EQ(sim.setUp(smoothSwing(), with(integrator, h, time)), PetscErrorCode(0));
+  EXPECT_EQ(sim.setUp(smoothSwing(), smoothly(integrator, h, time)), PetscErrorCode(0));
   for (std::size_t v = 0; v < sim.state.position.size(); ++v) {
     const double s = sim.state.position[v][0], shape = s * s * (6 - 4 * s + s * s) / 3;
     sim.state.velocity[v] = Vec3(0, 2.5 * shape, 1.5 * shape);
@@ -75,7 +75,7 @@ double ratio(const std::string &integrator, double time, double h, double growth
   sim.state.strains.clear();
   sim.state.last_dt = 0;
   runOn(sim, "sdirk33", h / 32, time + h);
-  return estimate / apart(end, sim.state);
+  return estimate / farApart(end, sim.state);
 }
 
 /// The next order in h is some hundredths; that of bdf2 without growth a tenth, for the step before has left its own

@@ -79,4 +79,12 @@ template <class T> CellOf<T> cast(const CellOf<double> &c) {
   return r;
 }
 
+/// A vector turned by three variables, from `first` on, as a rotation vector, up to second order.
+template <int N> Vector3<Dual<N>> turnedBy(const Vec3 &v, int first) {
+  using D = Dual<N>;
+  const Vector3<D> spin(D::variable(0, first), D::variable(0, first + 1), D::variable(0, first + 2));
+  const Vector3<D> start{D(v[0]), D(v[1]), D(v[2])}, once = spin.cross(start), twice = spin.cross(once);
+  return start + once + twice * D(0.5);
+}
+
 } // namespace tendril::test

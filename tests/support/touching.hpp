@@ -4,6 +4,8 @@
 
 namespace tendril::test {
 
+inline constexpr double earth = 9.81; ///< [m/s^2]
+
 inline ContactSettings amongRods(double radius, ContactSettings::Rods rods = ContactSettings::Rods::others) {
   ContactSettings s;
   s.radius = radius;
