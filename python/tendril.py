@@ -584,10 +584,23 @@ class Trajectory:
         edge), `gap` [m], `position` (n, 3) [m], `normal` (n, 3), `normal_force` and `friction` (n, 3) on the rod [N]."""
         if "contacts" not in self._file:
             raise TendrilError("there are no contacts; runs with colliders and -output_fields all,contacts have them")
+        return self._rows("contacts", frame)
+
+    def touching(self, frame=-1):
+        """Samples of rods and bodies that touch others in a frame: arrays of one row each by name, as `contacts`. `rod`,
+        `edge` and `body` have the sample (-1 is none), `at` in its edge, and touch `to_rod`, `to_edge`, `to_body` at
+        `to_at`; `normal_force` and `friction` (n, 3) act on what has the sample, their opposite on the other [N]."""
+        if "touching" not in self._file:
+            raise TendrilError("there is no /touching; runs with 'contact: {rods: ...}' or '{bodies: true}' and "
+                               "-output_fields all,touching have it")
+        return self._rows("touching", frame)
+
+    def _rows(self, group, frame):
+        """Those of a frame, by name."""
         k = self._frame(frame)
-        end = self._dataset("contacts/end")
+        end = self._dataset(group + "/end")
         rows = slice(int(end[k - 1]) if k else 0, int(end[k]))
-        return {name: self._dataset("contacts/" + name)[rows] for name in self._file["contacts"] if name != "end"}
+        return {name: self._dataset(f"{group}/{name}")[rows] for name in self._file[group] if name != "end"}
 
     def at(self, time):
         """The Moment at a time [s] within the run."""

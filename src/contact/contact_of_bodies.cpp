@@ -1,5 +1,6 @@
 /// Contact of rigid bodies with rods and with each other: samples of the ones against the others as solids, with
 /// friction at their surfaces (docs/theory.md, Contact between rods).
+#include "tendril/contact/pair_friction.hpp"
 #include "tendril/contact/touching_bodies.hpp"
 #include "tendril/coupling/couplings.hpp"
 #include "tendril/state/spin_stage.hpp"
@@ -12,8 +13,7 @@ namespace {
 class ContactOfBodies final : public Term {
 public:
   ContactOfBodies(const Scene &scene, const Elements &elements)
-      : scene_(scene), elements_(elements), bodies_(scene, elements), sliding_(scene.rods.size()),
-        slides_(scene.slidesAmongMoving()) {}
+      : scene_(scene), elements_(elements), bodies_(scene, elements), friction_(scene, false) {}
 
   void findTouching(const State &state, const Configuration &start, const Planes &way, const Step &step, double room,
                     std::vector<TouchingPair> &pairs) override {
@@ -23,14 +23,10 @@ public:
       p.number += first_number_;
       pairs.push_back(p);
     }
-    start_ = &start;
-    time_ = slidingTime(state, step);
-    for (int r = 0; r < int(sliding_.size()) && slides_; ++r) {
-      OfSliding &s = sliding_[std::size_t(r)];
-      s = {};
-      if (time_ > 0) s.points = slidingPairs(start, r);
-    }
+    friction_.begin(state, start, step);
+    for (int r = 0; r < int(scene_.rods.size()) && friction_.acts(); ++r) friction_.points(r) = slidingPairs(start, r);
   }
+  void addRooms(int r, std::vector<Box> &rooms) const override { bodies_.addRooms(r, rooms); }
   bool nearlyTouch(const TouchingPair &pair, const Configuration &c) const override {
     if (pair.isOfRods()) return false;
     TouchingPair own = pair;
@@ -50,7 +46,7 @@ public:
 
   double energy(const Configuration &c, int r) const override {
     double sum = normalEnergy(c, r);
-    for (const SlidingPair &p : sliding_[std::size_t(r)].points) sum += forceOn(p, c).value;
+    for (const SlidingPair &p : friction_.points(r)) sum += friction_.forceOn(p, c).value;
     return sum;
   }
   double noise(const Configuration &c, int r, double) const override {
@@ -75,8 +71,8 @@ public:
   void addDerivatives(const Configuration &, int, Derivatives &, HessianKind) const override {} // none is of one alone
   void addBetween(const Configuration &c, RodSet island, Derivatives &out, HessianKind kind) const override {
     for (int r = island.begin; r < island.end; ++r) {
-      auto sliding = sliding_[std::size_t(r)].points.begin();
-      const auto end = sliding_[std::size_t(r)].points.end();
+      auto sliding = friction_.points(r).begin();
+      const auto end = friction_.points(r).end();
       for (const TouchingPair &p : bodies_.pairs().of({r, r + 1})) {
         OfPair d;
         bool any = false;
@@ -86,7 +82,7 @@ public:
         });
         for (; sliding != end && sliding->pair.number == p.number; ++sliding) { // both lists are in one order
           any = true;
-          addFriction(*sliding, forceOn(*sliding, c), c, kind, d);
+          addFriction(*sliding, friction_.forceOn(*sliding, c), c, kind, d);
         }
         if (any) addPair(elements_, p, first_number_ + p.number, d, kind, out);
       }
@@ -118,24 +114,15 @@ public:
   }
 
   double renew(const Configuration &iterate, int r) override {
-    if (!slides_ || time_ == 0) return 0;
-    OfSliding &s = sliding_[std::size_t(r)];
-    return renewSliding(s.points, slidingPairs(iterate, r), s.rounds,
-                        [&](const SlidingPair &p) { return forceOn(p, iterate); });
+    return friction_.renew(iterate, r, [&] { return slidingPairs(iterate, r); });
   }
+  void commit(State &state, const Configuration &c, int r) const override { friction_.commit(state, c, r); }
 
 private:
-  struct OfSliding {
-    std::vector<SlidingPair> points;
-    SlidingRounds rounds;
-  };
   const Scene &scene_;
   const Elements &elements_;
   TouchingBodies bodies_;
-  std::vector<OfSliding> sliding_; ///< by the rods that have the pairs
-  const bool slides_;
-  const Configuration *start_ = nullptr;
-  double time_ = 0; ///< that the step takes; 0 in statics [s]
+  PairFriction friction_;
   int first_number_ = 0;
 
   double normalEnergy(const Configuration &c, int r) const {
@@ -189,16 +176,12 @@ private:
     d.hessian.middleRows<3>(other + 3) += turned.transpose();
   }
 
-  SlidingForce forceOn(const SlidingPair &p, const Configuration &c) const {
-    return frictionOn(p, bodies_.settingsOf(p.pair, 0), bodies_.settingsOf(p.pair, 1), time_, c);
-  }
-
   /// What touches at a configuration. The point is in the middle between both surfaces, or on the axis of a rod whose
   /// friction acts there.
   std::vector<SlidingPair> slidingPairs(const Configuration &c, int r) const {
     std::vector<SlidingPair> points;
     bodies_.visit(c, {r, r + 1}, [&](const TouchingPair &pair, const TouchingSolid &t) {
-      const double pressing = -t.weight * bodies_.lawOf(pair)(t.gap).slope;
+      const double pressing = friction_.pressing(bodies_.lawOf(pair), t.weight, t.gap, pair);
       if (!(pressing > 0)) return;
       const int solid = pair.body(t.solid());
       const Collider::Pose pose = bodies_.poseOf(solid, c);
@@ -212,9 +195,8 @@ private:
       p.own.arm -= out * (matrixOf(c.frameAt(frame)).transpose() * normal);
       p.other.arm = matrixOf(c.frameAt(pair.slot[to + 1])).transpose() * (armTo(pair, t, c) - out * normal);
       p.point.pressing = pressing * steep.norm();
-      p.point.coefficient = bothSlide(bodies_.settingsOf(pair, 0), bodies_.settingsOf(pair, 1)).friction;
       p.point.normal = normal;
-      p.point.start = wayBetween(pair, t.side, p.own, p.other, *start_);
+      friction_.complete(&p);
       points.push_back(p);
     });
     return points;

@@ -17,8 +17,9 @@ const ContactMemory *find(const std::vector<ContactMemory> &memory, int edge, in
 
 ContactSettings bothSlide(const ContactSettings &a, const ContactSettings &b) {
   ContactSettings both = a;
-  for (double ContactSettings::*value : {&ContactSettings::friction, &ContactSettings::fall_off_velocity,
-                                         &ContactSettings::tangential_damping, &ContactSettings::normal_damping})
+  for (double ContactSettings::*value :
+       {&ContactSettings::friction, &ContactSettings::fall_off_velocity, &ContactSettings::tangential_damping,
+        &ContactSettings::normal_damping, &ContactSettings::slip_length})
     both.*value = std::sqrt(a.*value * b.*value);
   return both;
 }

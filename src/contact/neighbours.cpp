@@ -101,19 +101,18 @@ bool Neighbours::mayTouch(int rod, int edge, int to_rod, int to_edge) const {
          });
 }
 
-/// The box in which an edge may be, with its radius and half of what its law reaches.
-std::array<Vec3, 2> Neighbours::boxOf(const Room &room, int rod, int edge) const {
+Box Neighbours::boxOf(const Room &room, int rod, int edge) const {
   const RodRange &range = elements_.rods[std::size_t(rod)];
   const std::size_t a = std::size_t(range.first_vertex + edge),
                     b = std::size_t(range.first_vertex + (edge + 1) % range.vertices);
   const double about = scene_.rods[std::size_t(rod)].contact.radius + 0.25 * width_[std::size_t(rod)] +
                        std::max(room.beyond[a], room.beyond[b]);
-  Vec3 low = room.start[a], high = low;
-  for (const Vec3 &x : {room.start[b], Vec3(room.start[a] + room.way[a]), Vec3(room.start[b] + room.way[b])}) {
-    low = low.cwiseMin(x);
-    high = high.cwiseMax(x);
+  Box box;
+  for (const std::size_t v : {a, b}) {
+    box.include(room.start[v]);
+    box.include(Vec3(room.start[v] + room.way[v]));
   }
-  return {low.array() - about, high.array() + about};
+  return box.widened(about);
 }
 
 bool Neighbours::isNear(const Room &room, int rod, int edge, int to_rod, int to_edge) const {
@@ -185,7 +184,7 @@ constexpr int chunk_edges = 8;
 /// Neighbouring edges of a rod, and the box in which they may be.
 struct Chunk {
   int rod, begin, end;
-  Vec3 low, high;
+  Box box;
 };
 
 /// A chunk in one cell of the grid.
@@ -194,10 +193,6 @@ struct InCell {
   int chunk;
   bool operator<(const InCell &other) const { return std::pair(cell, chunk) < std::pair(other.cell, other.chunk); }
 };
-
-bool overlap(const Vec3 &low, const Vec3 &high, const Vec3 &other_low, const Vec3 &other_high) {
-  return (low.array() <= other_high.array()).all() && (other_low.array() <= high.array()).all();
-}
 
 bool isBefore(const TouchingPair &a, const TouchingPair &b) {
   return std::tuple(a.rod, a.edge, a.to_rod, a.to_edge) < std::tuple(b.rod, b.edge, b.to_rod, b.to_edge);
@@ -220,42 +215,38 @@ std::vector<TouchingPair> Neighbours::find(const Room &room) const {
   constexpr int bits = 21, most_cells = 1 << (bits - 1); // along an axis
   std::vector<Chunk> chunks;
   std::vector<double> sizes;
-  Vec3 origin = Vec3::Constant(HUGE_VAL), far = -origin;
+  Box all;
   for (int r = 0; r < int(elements_.rods.size()); ++r) {
     const RodRange &rod = elements_.rods[std::size_t(r)];
     const ContactSettings &contact = scene_.rods[std::size_t(r)].contact;
     if (!contact.touchesRods()) continue;
     for (int i = 0; i < rod.edges; i += chunk_edges) {
-      Chunk chunk{r, i, std::min(i + chunk_edges, rod.edges), Vec3::Constant(HUGE_VAL), Vec3::Constant(-HUGE_VAL)};
+      Chunk chunk{r, i, std::min(i + chunk_edges, rod.edges), {}};
       double beyond = 0;
       for (int k = chunk.begin; k <= chunk.end; ++k) {
         const std::size_t v = std::size_t(rod.first_vertex + k % rod.vertices);
-        const Vec3 &x = room.start[v], there = x + room.way[v];
-        chunk.low = chunk.low.cwiseMin(x.cwiseMin(there));
-        chunk.high = chunk.high.cwiseMax(x.cwiseMax(there));
+        chunk.box.include(room.start[v]);
+        chunk.box.include(Vec3(room.start[v] + room.way[v]));
         beyond = std::max(beyond, room.beyond[v]);
       }
-      const double about = contact.radius + 0.25 * width_[std::size_t(r)] + beyond;
-      chunk.low.array() -= about;
-      chunk.high.array() += about;
-      sizes.push_back((chunk.high - chunk.low).maxCoeff());
-      origin = origin.cwiseMin(chunk.low);
-      far = far.cwiseMax(chunk.high);
+      chunk.box = chunk.box.widened(contact.radius + 0.25 * width_[std::size_t(r)] + beyond);
+      sizes.push_back((chunk.box.high - chunk.box.low).maxCoeff());
+      all.include(chunk.box);
       chunks.push_back(chunk);
     }
   }
   if (chunks.empty()) return {};
   std::nth_element(sizes.begin(), sizes.begin() + std::ptrdiff_t(sizes.size() / 2), sizes.end());
-  const double cell = std::max(sizes[sizes.size() / 2], (far - origin).maxCoeff() / most_cells);
+  const double cell = std::max(sizes[sizes.size() / 2], (all.high - all.low).maxCoeff() / most_cells);
   auto cellAt = [&](const Vec3 &x) {
     std::array<std::uint64_t, 3> at;
-    for (int a = 0; a < 3; ++a) at[std::size_t(a)] = std::uint64_t((x[a] - origin[a]) / cell);
+    for (int a = 0; a < 3; ++a) at[std::size_t(a)] = std::uint64_t((x[a] - all.low[a]) / cell);
     return at;
   };
   auto keyOf = [](std::uint64_t x, std::uint64_t y, std::uint64_t z) { return (x << 2 * bits) | (y << bits) | z; };
   std::vector<InCell> cells;
   for (std::size_t k = 0; k < chunks.size(); ++k) {
-    const auto low = cellAt(chunks[k].low), high = cellAt(chunks[k].high);
+    const auto low = cellAt(chunks[k].box.low), high = cellAt(chunks[k].box.high);
     for (std::uint64_t x = low[0]; x <= high[0]; ++x)
       for (std::uint64_t y = low[1]; y <= high[1]; ++y)
         for (std::uint64_t z = low[2]; z <= high[2]; ++z) cells.push_back({keyOf(x, y, z), int(k)});
@@ -267,14 +258,13 @@ std::vector<TouchingPair> Neighbours::find(const Room &room) const {
     if (same && (scene_.rods[std::size_t(a.rod)].contact.rods != ContactSettings::Rods::all ||
                  isApart(room, a.rod, a.begin, b.begin)))
       return;
-    std::array<std::array<Vec3, 2>, chunk_edges> boxes;
+    std::array<Box, chunk_edges> boxes;
     for (int j = b.begin; j < b.end; ++j) boxes[std::size_t(j - b.begin)] = boxOf(room, b.rod, j);
     for (int i = a.begin; i < a.end; ++i) {
-      const auto [low, high] = boxOf(room, a.rod, i);
-      if (!overlap(low, high, b.low, b.high)) continue;
+      const Box box = boxOf(room, a.rod, i);
+      if (!box.overlaps(b.box)) continue;
       for (int j = b.begin; j < (itself ? i : b.end); ++j) {
-        const auto &[other_low, other_high] = boxes[std::size_t(j - b.begin)];
-        if (overlap(low, high, other_low, other_high) && mayTouch(a.rod, i, b.rod, j) &&
+        if (box.overlaps(boxes[std::size_t(j - b.begin)]) && mayTouch(a.rod, i, b.rod, j) &&
             isNear(room, a.rod, i, b.rod, j))
           pairs.push_back(pairOf(a.rod, i, b.rod, j));
       }
@@ -286,8 +276,8 @@ std::vector<TouchingPair> Neighbours::find(const Room &room) const {
     for (std::size_t i = begin; i < end; ++i)
       for (std::size_t j = begin; j <= i; ++j) {
         const Chunk &a = chunks[std::size_t(cells[i].chunk)], &b = chunks[std::size_t(cells[j].chunk)];
-        if (!overlap(a.low, a.high, b.low, b.high)) continue;
-        const auto first = cellAt(a.low.cwiseMax(b.low)); // they meet in other cells, too
+        if (!a.box.overlaps(b.box)) continue;
+        const auto first = cellAt(a.box.low.cwiseMax(b.box.low)); // they meet in other cells, too
         if (keyOf(first[0], first[1], first[2]) == cells[begin].cell) take(a, b);
       }
   }
@@ -302,9 +292,7 @@ std::vector<TouchingPair> Neighbours::findByAll(const Room &room) const {
     for (int i = 0; i < elements_.rods[std::size_t(r)].edges; ++i)
       for (int q = 0; q <= r; ++q)
         for (int j = 0; j < (q == r ? i : elements_.rods[std::size_t(q)].edges); ++j) {
-          const auto [low, high] = boxOf(room, r, i);
-          const auto [other_low, other_high] = boxOf(room, q, j);
-          if (overlap(low, high, other_low, other_high) && mayTouch(r, i, q, j) && isNear(room, r, i, q, j) &&
+          if (boxOf(room, r, i).overlaps(boxOf(room, q, j)) && mayTouch(r, i, q, j) && isNear(room, r, i, q, j) &&
               !(q == r && isApart(room, r, i, j)))
             pairs.push_back(pairOf(r, i, q, j));
         }

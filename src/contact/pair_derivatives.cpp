@@ -80,13 +80,6 @@ void addCurvature(const TouchingPair &p, int side, const CarriedPoint &point, co
   out.hessian.block<half, half>(first, first) += edge.transpose() * bent.hessian * edge;
 }
 
-SlidingForce frictionOn(const SlidingPair &p, const ContactSettings &one, const ContactSettings &other, double time,
-                        const Configuration &c) {
-  const ContactSettings both = bothSlide(one, other);
-  return slidingForce(p.point, both, {both.fall_off_velocity * time, time},
-                      wayBetween(p.pair, p.side, p.own, p.other, c) - p.point.start);
-}
-
 void addFriction(const SlidingPair &p, const SlidingForce &force, const Configuration &c, HessianKind kind,
                  OfPair &out) {
   Eigen::Matrix<double, 3, OfPair::size> by;

@@ -1,6 +1,6 @@
 /// Contact of rods with each other and with themselves: samples along each edge against the other as a capsule, both
 /// ways at half their weight, with friction at their surfaces (docs/theory.md, Contact between rods).
-#include "tendril/contact/pair_derivatives.hpp"
+#include "tendril/contact/pair_friction.hpp"
 #include "tendril/contact/touching_rods.hpp"
 #include "tendril/coupling/couplings.hpp"
 
@@ -12,25 +12,20 @@ namespace {
 class RodContact final : public Term {
 public:
   RodContact(const Scene &scene, const Elements &elements)
-      : scene_(scene), elements_(elements), rods_(scene, elements), sliding_(scene.rods.size()),
-        slides_(scene.slidesAmongMoving()) {}
+      : scene_(scene), elements_(elements), rods_(scene, elements), friction_(scene, true) {}
 
   void findTouching(const State &state, const Configuration &start, const Planes &way, const Step &step, double room,
                     std::vector<TouchingPair> &pairs) override {
     rods_.find(state, start, way, step, room);
-    start_ = &start;
-    time_ = slidingTime(state, step);
-    for (int r = 0; r < int(sliding_.size()) && slides_; ++r) {
-      OfSliding &s = sliding_[std::size_t(r)];
-      s = {};
-      if (time_ > 0) s.points = slidingPairs(start, r);
-    }
+    friction_.begin(state, start, step);
+    for (int r = 0; r < int(scene_.rods.size()) && friction_.acts(); ++r) friction_.points(r) = slidingPairs(start, r);
     first_number_ = int(pairs.size());
     for (TouchingPair p : rods_.expected()) {
       p.number = int(pairs.size());
       pairs.push_back(p);
     }
   }
+  void addRooms(int r, std::vector<Box> &rooms) const override { rods_.addRooms(r, rooms); }
   bool nearlyTouch(const TouchingPair &pair, const Configuration &c) const override {
     return pair.isOfRods() && tendril::nearlyTouch(scene_, pair, TouchingRods::pointsOf(pair, c));
   }
@@ -47,7 +42,7 @@ public:
     double sum = 0;
     rods_.visit(c, {r, r + 1},
                 [&](const TouchingPair &p, const Touching &t) { sum += t.weight * rods_.lawOf(p)(t.gap).value; });
-    for (const SlidingPair &p : sliding_[std::size_t(r)].points) sum += forceOn(p, c).value;
+    for (const SlidingPair &p : friction_.points(r)) sum += friction_.forceOn(p, c).value;
     return sum;
   }
   double noise(const Configuration &c, int r, double) const override {
@@ -73,8 +68,8 @@ public:
   void addDerivatives(const Configuration &, int, Derivatives &, HessianKind) const override {} // none is of one alone
   void addBetween(const Configuration &c, RodSet island, Derivatives &out, HessianKind kind) const override {
     for (int r = island.begin; r < island.end; ++r) {
-      auto sliding = sliding_[std::size_t(r)].points.begin();
-      const auto end = sliding_[std::size_t(r)].points.end();
+      auto sliding = friction_.points(r).begin();
+      const auto end = friction_.points(r).end();
       for (const TouchingPair &p : rods_.pairs().of({r, r + 1})) {
         OfPair d;
         bool any = false;
@@ -86,7 +81,7 @@ public:
         });
         for (; sliding != end && sliding->pair.number == p.number; ++sliding) { // both lists are in one order
           any = true;
-          addFriction(*sliding, forceOn(*sliding, c), c, kind, d);
+          addFriction(*sliding, friction_.forceOn(*sliding, c), c, kind, d);
         }
         if (!any) continue;
         const int number = rods_.expectedNumber(p);
@@ -113,28 +108,19 @@ public:
   }
 
   double renew(const Configuration &iterate, int r) override {
-    OfSliding &s = sliding_[std::size_t(r)];
-    if (!slides_ || time_ == 0) return 0;
-    return renewSliding(s.points, slidingPairs(iterate, r), s.rounds,
-                        [&](const SlidingPair &p) { return forceOn(p, iterate); });
+    return friction_.renew(iterate, r, [&] { return slidingPairs(iterate, r); });
   }
-  void commit(State &state, const Configuration &, int r) const override {
+  void commit(State &state, const Configuration &c, int r) const override {
+    friction_.commit(state, c, r);
     state.rod_contact_stiffness.resize(scene_.rods.size(), 0);
     state.rod_contact_stiffness[std::size_t(r)] = rods_.stiffness()[std::size_t(r)];
   }
 
 private:
-  struct OfSliding {
-    std::vector<SlidingPair> points;
-    SlidingRounds rounds;
-  };
   const Scene &scene_;
   const Elements &elements_;
   TouchingRods rods_;
-  std::vector<OfSliding> sliding_; ///< by the rods that have the pairs
-  const bool slides_;
-  const Configuration *start_ = nullptr;
-  double time_ = 0; ///< that the step takes; 0 in statics [s]
+  PairFriction friction_;
   int first_number_ = 0;
 
   double energyBy(const std::vector<double> &stiffness, const Configuration &c, int r) const {
@@ -170,15 +156,11 @@ private:
     d.hessian -= t.weight * law.slope / (t.distance * other.squaredNorm()) * part * part.transpose();
   }
 
-  SlidingForce forceOn(const SlidingPair &p, const Configuration &c) const {
-    return frictionOn(p, rods_.settings(p.pair.rod), rods_.settings(p.pair.to_rod), time_, c);
-  }
-
   /// What touches at a configuration. The point is in the middle between both surfaces.
   std::vector<SlidingPair> slidingPairs(const Configuration &c, int r) const {
     std::vector<SlidingPair> points;
     rods_.visit(c, {r, r + 1}, [&](const TouchingPair &pair, const Touching &t) {
-      const double pressing = -t.weight * rods_.lawOf(pair)(t.gap).slope;
+      const double pressing = friction_.pressing(rods_.lawOf(pair), t.weight, t.gap, pair);
       if (t.taken_off) { // from the sample before
         if (!points.empty() && points.back().pair.number == pair.number && points.back().side == t.side &&
             points.back().sample == t.sample)
@@ -193,7 +175,6 @@ private:
                     {-t.part[std::size_t(t.other() + 1)], Vec3::Zero()},
                     {}};
       p.point.pressing = pressing;
-      p.point.coefficient = bothSlide(rods_.settings(pair.rod), rods_.settings(pair.to_rod)).friction;
       p.point.normal = t.normal;
       for (const bool own : {true, false}) {
         const int side = own ? t.side : 1 - t.side;
@@ -203,7 +184,7 @@ private:
         (own ? p.own : p.other).arm =
             (own ? -1 : 1) * (rod.contact.radius + 0.5 * t.gap) * (matrixOf(frame).transpose() * t.normal);
       }
-      p.point.start = wayBetween(pair, p.side, p.own, p.other, *start_);
+      friction_.complete(&p);
       points.push_back(p);
     });
     return points;

@@ -158,6 +158,19 @@ void TouchingBodies::find(const Configuration &start, const Planes &way, const S
   std::fill(bounded_.begin(), bounded_.end(), 0);
 }
 
+void TouchingBodies::addRooms(int r, std::vector<Box> &rooms) const {
+  const ContactSettings &contact = scene_.rods[std::size_t(r)].contact;
+  const RodRange &rod = elements_.rods[std::size_t(r)];
+  const double away = contact.radius + NormalLaw(contact, contact.stiffness).reach() + rod_room_[std::size_t(r)];
+  Box room;
+  for (int i = 0; i < rod.vertices; ++i) room.include(start_.positionAt(rod.slot(i)));
+  if (contact.touchesBodies()) rooms.push_back(room.widened(away));
+  for (const JoinedBody &b : elements_.bodies({r, r + 1}))
+    if (const Solid &solid = solids_[std::size_t(b.body)]; solid.shape)
+      rooms.push_back(Box{start_.positionAt(b.position), start_.positionAt(b.position)}.widened(
+          solid.reach + scene_.bodies[std::size_t(b.body)].contact.distance + body_room_[std::size_t(b.body)]));
+}
+
 void TouchingBodies::cover(const Configuration &c, int r) const {
   if (!start_.empty() && isInRoom(c, c, 0, r)) return;
   makeRoom(c, nullptr, 1);

@@ -106,6 +106,13 @@ void TouchingRods::makeRoom(const Configuration &start, const Planes *way, doubl
   }
 }
 
+void TouchingRods::addRooms(int r, std::vector<Box> &rooms) const {
+  if (!settings(r).touchesRods()) return;
+  Box room;
+  for (int i = 0; i < elements_.rods[std::size_t(r)].edges; ++i) room.include(neighbours_.boxOf(room_, r, i));
+  rooms.push_back(room);
+}
+
 /// Whether a rod is in its room at a part of the straight way between two configurations.
 bool TouchingRods::isInRoom(const Configuration &from, const Configuration &to, double part, int r) const {
   const RodRange &rod = elements_.rods[std::size_t(r)];

@@ -12,6 +12,8 @@ void Simulation::describe(Scene scene_to_describe, bool in_time) {
 
 PetscErrorCode Simulation::prepare(Scene part, const LoopSettings &settings, const Team &team) {
   PetscFunctionBeginUser;
+  potential.reset();
+  dofs = DofMap();
   scene = std::move(part);
   dynamic = settings.dynamic;
   PetscCall(dofs.setUp(scene));

@@ -7,8 +7,8 @@
 
 namespace tendril {
 
-Slice::Slice(const Scene &whole, const Partition &partition, const Team &team) : team_(team) {
-  if (team.isAlone() && partition.isOrdered()) return;
+Slice::Slice(const Scene &whole, const Partition &partition, const Team &team, bool apart) : team_(team) {
+  if (team.isAlone() && partition.isOrdered() && !apart) return;
   parts_.resize(team.size());
   std::vector<int> rank_of(whole.rods.size());
   for (int rank = 0; rank < team.size(); ++rank) {
@@ -31,7 +31,8 @@ Slice::Slice(const Scene &whole, const Partition &partition, const Team &team) :
 
 Scene Slice::sceneOf(const Scene &whole) const {
   Scene own = withRods(whole, parts_[team_.rank()].rods);
-  own.whole = {whole.strainsDissipate(), whole.slides(), whole.hasCouples(), whole.edges()};
+  own.whole = {whole.strainsDissipate(), whole.slides(),        whole.hasCouples(),
+               whole.touchesRods(),      whole.touchesBodies(), whole.edges()};
   return own;
 }
 
@@ -117,14 +118,19 @@ public:
     move(mine.joints, of(&State::joints), &Part::joints, one, std::size_t(slice_.joints_));
     moveStrains(own, mine, all);
     moveActions(mine, all);
-    if (!mine.contact_stiffness.empty())
-      move(mine.contact_stiffness, of(&State::contact_stiffness), &Part::rods, one, rods);
-    else if (all && collects_)
-      all->contact_stiffness.clear();
+    for (auto array : {&State::contact_stiffness, &State::rod_contact_stiffness})
+      if (!(mine.*array).empty())
+        move(mine.*array, of(array), &Part::rods, one, rods);
+      else if (all && collects_)
+        (all->*array).clear();
     if (!mine.contacts.empty())
       moveContacts(mine, all, rods);
     else if (all && collects_)
       all->contacts.clear();
+    if (!mine.pairs.empty())
+      movePairs(mine, all, rods);
+    else if (all && collects_)
+      all->pairs.clear();
     move(mine.junction_axes, of(&State::junction_axes), &Part::groups, one, std::size_t(slice_.groups_));
   }
 
@@ -161,34 +167,30 @@ private:
   }
 
   /// First how many rows each rod has, then the rows.
-  void moveContacts(State &mine, State *all, std::size_t rods) const {
-    using Row = std::array<double, 9>;
+  template <std::size_t width, class Memory, class Flatten, class Unfold>
+  void moveRows(std::vector<std::vector<Memory>> &mine, std::vector<std::vector<Memory>> *all, std::size_t rods,
+                Flatten flatten, Unfold unfold) const {
+    using Row = std::array<double, width>;
     std::vector<double> counts, all_counts;
     std::vector<Row> rows, all_rows;
-    auto flatten = [](const std::vector<std::vector<ContactMemory>> &contacts, std::vector<double> &n,
-                      std::vector<Row> &out) {
-      for (const auto &of_rod : contacts) {
+    auto flattenAll = [&](const std::vector<std::vector<Memory>> &from, std::vector<double> &n, std::vector<Row> &out) {
+      for (const auto &of_rod : from) {
         n.push_back(double(of_rod.size()));
-        for (const ContactMemory &m : of_rod)
-          out.push_back({double(m.edge), double(m.point), double(m.collider), m.stick[0], m.stick[1], m.stick[2],
-                         m.friction[0], m.friction[1], m.friction[2]});
+        for (const Memory &m : of_rod) out.push_back(flatten(m));
       }
     };
-    auto unfold = [](const std::vector<double> &n, const std::vector<Row> &from,
-                     std::vector<std::vector<ContactMemory>> &contacts) {
-      contacts.assign(n.size(), {});
+    auto unfoldAll = [&](const std::vector<double> &n, const std::vector<Row> &from,
+                         std::vector<std::vector<Memory>> &to) {
+      to.assign(n.size(), {});
       std::size_t next = 0;
       for (std::size_t r = 0; r < n.size(); ++r)
-        for (double k = 0; k < n[r]; ++k) {
-          const Row &m = from[next++];
-          contacts[r].push_back({int(m[0]), int(m[1]), int(m[2]), {m[3], m[4], m[5]}, {m[6], m[7], m[8]}});
-        }
+        for (double k = 0; k < n[r]; ++k) to[r].push_back(unfold(from[next++]));
     };
     if (collects_)
-      flatten(mine.contacts, counts, rows);
+      flattenAll(mine, counts, rows);
     else
-      counts.resize(mine.contacts.size());
-    if (!collects_ && all) flatten(all->contacts, all_counts, all_rows);
+      counts.resize(mine.size());
+    if (!collects_ && all) flattenAll(*all, all_counts, all_rows);
     move(counts, &all_counts, &Part::rods, one, rods);
     std::vector<int> begin{0};
     for (const double n : all_counts) begin.push_back(begin.back() + int(n));
@@ -197,9 +199,54 @@ private:
         rows, &all_rows, &Part::rods, [&](int r) { return std::pair(begin[r], int(all_counts[r])); },
         std::size_t(begin.back()));
     if (collects_ && all)
-      unfold(all_counts, all_rows, all->contacts);
+      unfoldAll(all_counts, all_rows, *all);
     else if (!collects_)
-      unfold(counts, rows, mine.contacts);
+      unfoldAll(counts, rows, mine);
+  }
+
+  void moveContacts(State &mine, State *all, std::size_t rods) const {
+    auto flatten = [](const ContactMemory &m) {
+      return std::array<double, 9>{double(m.edge), double(m.point), double(m.collider), m.stick[0],   m.stick[1],
+                                   m.stick[2],     m.friction[0],   m.friction[1],      m.friction[2]};
+    };
+    auto unfold = [](const std::array<double, 9> &m) {
+      return ContactMemory{int(m[0]), int(m[1]), int(m[2]), {m[3], m[4], m[5]}, {m[6], m[7], m[8]}};
+    };
+    moveRows<9>(mine.contacts, all ? &all->contacts : nullptr, rods, flatten, unfold);
+  }
+
+  /// Pairs name rods and bodies by the numbers of the scene on the way; on a rank those that it does not have come
+  /// behind its own.
+  void movePairs(State &mine, State *all, std::size_t rods) const {
+    const Part &part = slice_.parts_[team_.rank()];
+    auto rename = [&](PairMemory &m, auto numberIn) {
+      m.to_rod = numberIn(part.rods, m.to_rod);
+      for (int *edge : {&m.edge, &m.to_edge})
+        if (*edge < 0) *edge = TouchingPair::ofBody(numberIn(part.bodies, -1 - *edge));
+    };
+    auto whole = [](const std::vector<int> &items, int k) {
+      const int count = int(items.size());
+      return k < count ? items[std::size_t(k)] : k - count;
+    };
+    auto own = [](const std::vector<int> &items, int k) {
+      const auto found = std::find(items.begin(), items.end(), k);
+      return int(found - items.begin()) + (found == items.end() ? k : 0);
+    };
+    auto flatten = [](const PairMemory &m) {
+      return std::array<double, 10>{double(m.edge), double(m.to_rod), double(m.to_edge), double(m.point),
+                                    m.stick[0],     m.stick[1],       m.stick[2],        m.friction[0],
+                                    m.friction[1],  m.friction[2]};
+    };
+    auto unfold = [](const std::array<double, 10> &m) {
+      return PairMemory{int(m[0]), int(m[1]), int(m[2]), int(m[3]), {m[4], m[5], m[6]}, {m[7], m[8], m[9]}};
+    };
+    for (auto &of_rod : mine.pairs)
+      for (PairMemory &m : of_rod)
+        if (collects_) rename(m, whole);
+    moveRows<10>(mine.pairs, all ? &all->pairs : nullptr, rods, flatten, unfold);
+    for (auto &of_rod : mine.pairs)
+      for (PairMemory &m : of_rod)
+        if (!collects_) rename(m, own);
   }
 };
 
@@ -217,7 +264,7 @@ void Slice::collect(const Elements &own, const State &part, const Elements *whol
 void Slice::spread(const Elements &own, State *part, const Elements *whole, const State *state) const {
   State copy;
   State *const all = team_.leads() ? &copy : nullptr;
-  double facts[9] = {};
+  double facts[11] = {};
   if (all) {
     copy = *state;
     const std::size_t action = 2 * std::size_t(holders_);
@@ -229,7 +276,9 @@ void Slice::spread(const Elements &own, State *part, const Elements *whole, cons
                            double(copy.strains.size() / strainRow(*whole)),
                            double(action > 0 ? copy.support_actions.size() / action : 0),
                            double(!copy.contact_stiffness.empty()),
-                           double(!copy.contacts.empty())};
+                           double(!copy.contacts.empty()),
+                           double(!copy.rod_contact_stiffness.empty()),
+                           double(!copy.pairs.empty())};
     std::copy(std::begin(here), std::end(here), facts);
   }
   team_.share(facts);
@@ -244,6 +293,8 @@ void Slice::spread(const Elements &own, State *part, const Elements *whole, cons
   part->support_actions.assign(std::size_t(facts[6]) * 2 * parts_[team_.rank()].holders.size(), Vec3::Zero());
   part->contact_stiffness.assign(facts[7] != 0 ? rods : 0, 0.0);
   part->contacts.assign(facts[8] != 0 ? rods : 0, {});
+  part->rod_contact_stiffness.assign(facts[9] != 0 ? rods : 0, 0.0);
+  part->pairs.assign(facts[10] != 0 ? rods : 0, {});
   Transfer(*this, false, whole).moveAll(own, *part, all);
 }
 

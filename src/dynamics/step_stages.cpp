@@ -35,9 +35,11 @@ PetscErrorCode TimeLoop::solveStages(const State &start, State *next, Attempt *n
       finish(start, h, rods, next);
       now->commit(potential, rods, next);
     };
+    solver_.on_again = [now] { now->forget(); };
     NewtonReport one;
     PetscCall(solver_.solve(start, stage, &one));
     solver_.on_block = nullptr;
+    solver_.on_again = nullptr;
     const int iterations = one.iterations;
     NewtonReport &report = now->report;
     one.iterations += report.iterations; // stages follow each other; blocks of rods do not

@@ -79,10 +79,12 @@ PetscErrorCode TimeLoop::attempt(const State &state, State *next, Attempt *now) 
     PetscFunctionReturn(0);
   }
   solver_.on_block = [&](RodSet rods) { now->commit(solver_.potential(), rods, next); };
+  solver_.on_again = [now] { now->forget(); };
   std::optional<Guess> guess;
   if (mode_) guess = alongMode(state, now->step);
   PetscCall(solver_.solve(state, now->step, &now->report, Seek::minimum, guess ? &*guess : nullptr));
   solver_.on_block = nullptr;
+  solver_.on_again = nullptr;
   next->time = now->step.time;
   if (!now->report.converged) PetscFunctionReturn(0);
   measure(state, *next, now); // here, for a search for critical points within the step moves the iterate
@@ -126,7 +128,7 @@ void TimeLoop::Attempt::commit(const IncrementalPotential &potential, RodSet rod
 /// nothing about stability. What friction holds begins free, which is no critical point either.
 bool TimeLoop::mayPassCritical(const State &state, const NewtonReport &report) const {
   return !settings_.dynamic && settings_.bifurcation != Bifurcation::off && !solver_.potential().scene().hasCouples() &&
-         !solver_.potential().scene().slides() && control.stable && located_ <= state.time &&
+         !solver_.potential().scene().hasFriction() && control.stable && located_ <= state.time &&
          (report.first_negative_pivots > 0 || (isThorough() && report.mayPassCritical()));
 }
 
@@ -222,8 +224,8 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
   State next = state; // what the blocks that have converged come to; the state itself stays as it is until all have
   *finished = false;
   while (state.time < settings_.t_end) {
-    if (settings_.dynamic && state.memory.empty())
-      PetscCall(integrator_->begin(solver_, control.dt, state)); // at the start, and where the state was written
+    const bool begins = settings_.dynamic && state.memory.empty(); // at the start, and where the state was written
+    if (begins) PetscCall(integrator_->begin(solver_, control.dt, state));
     Attempt step;
     double landing;
     step.h = nextStep(state.time, &landing);
@@ -236,6 +238,15 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
       if (rejected > 0) out << ", after " << rejected << " that failed";
     });
     PetscCall(attempt(state, &next, &step));
+    if (step.report.meets) {
+      if (begins) state.memory.clear(); // of rods that did not know of each other
+      bool stays;
+      PetscCall(unite(&stays));
+      if (!stays) PetscFunctionReturn(0);
+      prepare(state);
+      next = state;
+      continue;
+    }
     if (!step.too_coarse && mayPassCritical(state, step.report)) {
       bool moved = false;
       const State before = state;

@@ -118,6 +118,8 @@ template <class Archive, class AnyContents> void exchange(Archive &a, AnyContent
   list("joints", "joints", s.joints);
   if (a.format_version < 9) return;
   list("rods_that_touch_rods", "rod_contact_stiffness", s.rod_contact_stiffness);
+  if (a.format_version < 10) return;
+  exchangePairs(a, s, whole);
 }
 
 /// Whole turns of cells that were others in the checkpoint: the twist of a vertex along the rod stays what it was, by
@@ -337,6 +339,7 @@ void adapt(Found *f, const std::vector<double> &places, const Simulation &run, c
   for (auto stiffness : {&State::contact_stiffness, &State::rod_contact_stiffness})
     if ((s.*stiffness).size() < rods) (s.*stiffness).clear();
   if (s.contacts.size() != rods) s.contacts.clear();
+  if (s.pairs.size() != rods) s.pairs.clear();
   s.junction_axes.resize(run.elements->groups, {Vec3::UnitX(), Vec3::UnitY()});
   for (Rates &rates : s.memory) rates.body.resize(run.scene.bodies.size());
   s.joints.resize(run.scene.joints.size());

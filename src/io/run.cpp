@@ -116,9 +116,10 @@ RunFacts factsOf(const Simulation &run, const Options &o, const SceneSource &sou
 }
 
 /// From the state of a run to its end, a stop or a failure, which is empty else.
-PetscErrorCode march(Simulation &run, TimeLoop &loop, const Options &o, const StopRequest &request, Recorder &recorder,
-                     Progress &progress, bool *finished, std::string *failure) {
+PetscErrorCode march(Prepared &prepared, TimeLoop &loop, const Options &o, const StopRequest &request,
+                     Recorder &recorder, Progress &progress, bool *finished, std::string *failure) {
   PetscFunctionBeginUser;
+  Simulation &run = *prepared.run;
   auto observe = [&](const State &state, const Diagnostics &row) { return recorder.observe(state, row); };
   auto critical = [&](const CriticalPoint &point) { return recorder.noteCritical(point); };
   auto stops = [&] { return request.asked(); };
@@ -138,10 +139,18 @@ PetscErrorCode march(Simulation &run, TimeLoop &loop, const Options &o, const St
   } else {
     loop.on_critical = critical;
     loop.stops = stops;
+    loop.unite = [&](bool *stays) {
+      PetscFunctionBeginUser;
+      std::string line;
+      PetscCall(unite(prepared, o, &line));
+      *stays = !prepared.team.isEmpty();
+      if (*stays) progress.say(line);
+      PetscFunctionReturn(0);
+    };
     PetscCall(loop.run(run.state, observe, finished));
     *failure = loop.failure();
   }
-  PetscCall(recorder.end(!*finished && failure->empty()));
+  if (!prepared.team.isEmpty()) PetscCall(recorder.end(!*finished && failure->empty()));
   PetscCall(PetscLogStagePop());
   PetscFunctionReturn(0);
 }
@@ -223,8 +232,9 @@ PetscErrorCode runPrepared(Prepared &prepared, int argc, char **argv, const Opti
   Recorder recorder(o, prepared, loop.control, begun.facts, begun.origin, progress);
   bool finished;
   std::string failure;
-  PetscCall(march(run, loop, o, request, recorder, progress, &finished, &failure));
-  int asked = request.exitCode(); // by a signal that not all ranks may have had
+  PetscCall(march(prepared, loop, o, request, recorder, progress, &finished, &failure));
+  if (team.isEmpty()) PetscFunctionReturn(0); // others have all there is
+  int asked = request.exitCode();             // by a signal that not all ranks may have had
   Tally tally;
   team.combine(tally.largest(asked));
   if (!team.leads()) PetscFunctionReturn(0);

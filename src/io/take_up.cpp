@@ -1,5 +1,6 @@
 #include "tendril/io/take_up.hpp"
 
+#include "tendril/io/checks.hpp"
 #include "tendril/io/prepare.hpp"
 
 #include <filesystem>
@@ -48,7 +49,7 @@ bool takeUp(const Options &o, const OutputFolder &folder, const RunFacts &facts,
       throw SceneError("option -restart: the results would replace those beside the checkpoint '" + from +
                        "'; choose another -output_dir, or write -restart auto");
     if (o.restart_time) run.state.time = *o.restart_time;
-    if (!run.scene.colliders.empty() && (changed || o.restart_time)) refuseOverlaps(run);
+    if ((!run.scene.colliders.empty() || run.scene.touchesMoving()) && (changed || o.restart_time)) refuseOverlaps(run);
   }
   if (!from.empty() && !(run.state.time < o.loop.t_end)) {
     if (changed && !o.loop.dynamic) {

@@ -169,7 +169,8 @@ const std::vector<std::string> &TrajectoryWriter::fieldNames() {
 const std::vector<std::string> &TrajectoryWriter::derivedFieldNames() {
   static const std::vector<std::string> names = [] {
     std::vector<std::string> all = namesOf(true);
-    all.push_back("contacts"); // a group of its own
+    all.push_back("contacts"); // groups of their own
+    all.push_back("touching");
     return all;
   }();
   return names;
@@ -202,7 +203,8 @@ TrajectoryWriter::TrajectoryWriter(const std::string &folder, const Scene &scene
     file_.writeAttribute(std::string("state/") + f.name, "unit", std::string(f.unit));
     file_.writeAttribute(std::string("state/") + f.name, "place", std::string(places[std::size_t(f.place)]));
   }
-  if (wanted.count("contacts") && !scene.colliders.empty()) contacts_ = std::make_unique<ContactWriter>(file_);
+  if (wanted.count("contacts") && !scene.colliders.empty()) contacts_ = makeContactWriter(file_);
+  if (wanted.count("touching") && scene.touchesMoving()) touching_ = makePairWriter(file_);
   file_.createGroup("summary");
   writeSummary(emptySummary(scene));
   file_.createGroup("diagnostics");
@@ -235,7 +237,7 @@ TrajectoryWriter::~TrajectoryWriter() {
     for (auto &series : *all) (void)series.release();
   for (auto *series : {&time_, &step_, &critical_}) (void)series->release();
   if (contacts_) contacts_->abandon();
-  (void)contacts_.release();
+  if (touching_) touching_->abandon();
   new Hdf5File(std::move(file_));
 }
 
@@ -264,6 +266,8 @@ void TrajectoryWriter::writeFrame(const State &state) {
     colliderActions(scene_, snapshot.contacts, state.time, &snapshot.collider_force, &snapshot.collider_moment);
   }
   if (contacts_) contacts_->append(snapshot.contacts);
+  if (touching_)
+    touching_->append(pairReadings(scene_, elements_, state, configurationOf(state, scene_, elements_, state.time)));
   for (const Collider &c : wanted(From::motion) ? scene_.colliders : std::vector<Collider>()) {
     const Collider::Pose pose = c.poseAt(state.time);
     snapshot.collider_position.push_back(pose.position);
@@ -315,6 +319,7 @@ void TrajectoryWriter::flush() {
   for (const auto &series : state_)
     if (series) series->flush();
   if (contacts_) contacts_->flush();
+  if (touching_) touching_->flush();
   step_->flush();
   time_->flush();
   broken_ = false;
@@ -322,7 +327,8 @@ void TrajectoryWriter::flush() {
 }
 
 void TrajectoryWriter::flushWhenDue() {
-  std::size_t waiting = csv_rows_.size() + (contacts_ ? contacts_->waitingBytes() : 0);
+  std::size_t waiting =
+      csv_rows_.size() + (contacts_ ? contacts_->waitingBytes() : 0) + (touching_ ? touching_->waitingBytes() : 0);
   for (const auto &series : state_)
     if (series) waiting += series->waitingBytes();
   const Clock::time_point now = Clock::now();

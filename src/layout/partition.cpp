@@ -161,7 +161,7 @@ std::vector<double> Partition::placesOf(int rank) const {
   return places;
 }
 
-Partition partition(const Scene &scene, int ranks, PartitionKind kind) {
+Partition partition(const Scene &scene, int ranks, PartitionKind kind, std::vector<int> group) {
   constexpr double even = 1.1; // imbalance that is not worth another order
   Partition p;
   const Islands islands = islandsOf(scene);
@@ -176,29 +176,42 @@ Partition partition(const Scene &scene, int ranks, PartitionKind kind) {
     if (islands.joined[first]) island_end[begin] = int(p.order.size());
   }
   p.blocks = tendril::blocksOf(edges, island_end);
-  p.ranks = std::min(ranks, int(p.blocks.size()));
+  p.group = std::move(group);
+  if (p.group.empty()) {
+    p.group.resize(p.blocks.size());
+    std::iota(p.group.begin(), p.group.end(), 0);
+  }
   const std::vector<std::int64_t> of_rods = workOfRods(scene);
   for (const Block &b : p.blocks) {
     p.work.push_back(0);
     for (int k = b.rods.begin; k < b.rods.end; ++k) p.work.back() += of_rods[p.order[k]];
   }
-  p.owner = dealContiguously(p.work, p.ranks);
-  auto mostOf = [&](const std::vector<int> &owner) {
-    const std::vector<std::int64_t> of_rank = loads(p.work, owner, p.ranks);
+  std::vector<int> place; // of the group of each block
+  std::vector<std::int64_t> work;
+  for (std::size_t b = 0; b < p.blocks.size(); ++b) {
+    const bool is_first = p.group[b] == int(b);
+    place.push_back(is_first ? int(work.size()) : place[std::size_t(p.group[b])]);
+    if (is_first) work.push_back(0);
+    work[std::size_t(place[b])] += p.work[b];
+  }
+  p.ranks = std::min(ranks, int(work.size()));
+  std::vector<int> owner = dealContiguously(work, p.ranks);
+  auto mostOf = [&](const std::vector<int> &deal) {
+    const std::vector<std::int64_t> of_rank = loads(work, deal, p.ranks);
     return *std::max_element(of_rank.begin(), of_rank.end());
   };
   const std::int64_t all = std::accumulate(p.work.begin(), p.work.end(), std::int64_t(0));
-  auto imbalanceOf = [&](const std::vector<int> &owner) { return double(mostOf(owner)) * p.ranks / double(all); };
-  if (p.ranks > 1 && kind != PartitionKind::contiguous &&
-      (kind == PartitionKind::metis || imbalanceOf(p.owner) > even)) {
-    const std::vector<int> owner = dealByMetis(p.work, p.ranks);
-    p.by_metis = !owner.empty() && (kind == PartitionKind::metis || mostOf(owner) < mostOf(p.owner));
-    if (p.by_metis) p.owner = owner;
+  auto imbalanceOf = [&](const std::vector<int> &deal) { return double(mostOf(deal)) * p.ranks / double(all); };
+  if (p.ranks > 1 && kind != PartitionKind::contiguous && (kind == PartitionKind::metis || imbalanceOf(owner) > even)) {
+    const std::vector<int> by_metis = dealByMetis(work, p.ranks);
+    p.by_metis = !by_metis.empty() && (kind == PartitionKind::metis || mostOf(by_metis) < mostOf(owner));
+    if (p.by_metis) owner = by_metis;
   }
-  const std::vector<std::int64_t> of_rank = loads(p.work, p.owner, p.ranks);
+  for (const int k : place) p.owner.push_back(owner[std::size_t(k)]);
+  const std::vector<std::int64_t> of_rank = loads(work, owner, p.ranks);
   p.most = *std::max_element(of_rank.begin(), of_rank.end());
   p.least = *std::min_element(of_rank.begin(), of_rank.end());
-  p.imbalance = imbalanceOf(p.owner);
+  p.imbalance = imbalanceOf(owner);
   return p;
 }
 

@@ -207,6 +207,21 @@ std::vector<double> Team::gather(std::span<const double> mine, const std::vector
   return all;
 }
 
+std::vector<double> Team::gatherAll(std::span<const double> mine) const {
+  if (isAlone()) return {mine.begin(), mine.end()};
+  int count = int(mine.size());
+  std::vector<int> counts(std::size_t(size_), 0), places{0};
+  MPI_Request request;
+  MPI_Iallgather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, comm_, &request);
+  finish(request);
+  for (const int n : counts) places.push_back(places.back() + n);
+  std::vector<double> all(std::size_t(places.back()));
+  MPI_Iallgatherv(mine.data(), count, MPI_DOUBLE, all.data(), counts.data(), places.data(), MPI_DOUBLE, comm_,
+                  &request);
+  finish(request);
+  return all;
+}
+
 void Team::scatter(const std::vector<double> &all, const std::vector<int> &counts, std::span<double> mine) const {
   if (isAlone()) {
     std::copy(all.begin(), all.end(), mine.begin());

@@ -72,6 +72,13 @@ void IncrementalPotential::findTouching(const State &start, double room) {
   std::fill(known_.begin(), known_.end(), Known::nothing);
 }
 
+std::vector<Box> IncrementalPotential::roomsOf(RodSet rods) const {
+  std::vector<Box> rooms;
+  for (int r = rods.begin; r < rods.end; ++r)
+    for (const auto &term : terms_) term->addRooms(r, rooms);
+  return rooms;
+}
+
 bool IncrementalPotential::nearlyTouch(const TouchingPair &pair) const {
   return std::any_of(terms_.begin(), terms_.end(),
                      [&](const std::unique_ptr<Term> &term) { return term->nearlyTouch(pair, iterate_); });

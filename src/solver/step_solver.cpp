@@ -29,7 +29,8 @@ PetscErrorCode StepSolver::setUp(IncrementalPotential &potential, Coupling coupl
 
 std::vector<RodSet> StepSolver::wantedBlocks() const {
   if (coupling_ != Coupling::none) return {potential_->all()};
-  return share_.blocks.empty() ? blocksOf(potential_->dofs()) : share_.blocks;
+  const bool touch = !potential_->dofs().touching().items.empty();
+  return share_.blocks.empty() || touch ? blocksOf(potential_->dofs()) : share_.blocks;
 }
 
 /// Finds what may touch in the step that has begun, and makes solvers for the islands that it joins.
@@ -46,6 +47,51 @@ PetscErrorCode StepSolver::findTouching(const State &start, double room) {
   if (!same) PetscCall(setUpBlocks(blocks));
   for (NewtonSolver &block : blocks_) block.takeTouching();
   PetscFunctionReturn(0);
+}
+
+/// Of a block among those of all ranks.
+double StepSolver::placeOf(std::size_t block) const {
+  if (share_.place.empty()) return double(block);
+  const int first = blocks_[block].rods().begin;
+  const auto next = std::upper_bound(share_.blocks.begin(), share_.blocks.end(), first,
+                                     [](int rod, const RodSet &b) { return rod < b.begin; });
+  return share_.place[std::size_t(next - share_.blocks.begin() - 1)];
+}
+
+/// Ranks tell each other where their rods and bodies may be in the step. \return whether what different ranks have may
+/// touch, which makes groups of their blocks
+bool StepSolver::meetsOthers() {
+  if (share_.owner.empty()) return false;
+  struct InBlock {
+    Box room;
+    int block;
+  };
+  constexpr std::size_t numbers = 7;
+  std::vector<double> mine;
+  for (std::size_t b = 0; b < share_.blocks.size(); ++b)
+    for (const Box &room : potential_->roomsOf(share_.blocks[b])) {
+      mine.insert(mine.end(), room.low.begin(), room.low.end());
+      mine.insert(mine.end(), room.high.begin(), room.high.end());
+      mine.push_back(share_.place[b]);
+    }
+  const std::vector<double> all = share_.team.gatherAll(mine);
+  std::vector<InBlock> rooms;
+  for (std::size_t k = 0; k < all.size(); k += numbers)
+    rooms.push_back({{{all[k], all[k + 1], all[k + 2]}, {all[k + 3], all[k + 4], all[k + 5]}}, int(all[k + 6])});
+  std::stable_sort(rooms.begin(), rooms.end(),
+                   [](const InBlock &a, const InBlock &b) { return a.room.low.x() < b.room.low.x(); });
+  std::vector<int> &group = share_.group;
+  bool meets = false;
+  for (std::size_t i = 0; i < rooms.size(); ++i)
+    for (std::size_t j = i + 1; j < rooms.size() && rooms[j].room.low.x() <= rooms[i].room.high.x(); ++j) {
+      const auto [a, b] = std::minmax(rooms[i].block, rooms[j].block);
+      const auto [first, other] = std::minmax(group[std::size_t(a)], group[std::size_t(b)]);
+      if (first == other || !rooms[i].room.overlaps(rooms[j].room)) continue;
+      meets = meets || share_.owner[std::size_t(a)] != share_.owner[std::size_t(b)];
+      const int from = other, to = first; // of references that change
+      std::replace(group.begin(), group.end(), from, to);
+    }
+  return meets;
 }
 
 /// Where another solver than `banded` was chosen for rods that nothing joins, it needs all of them as one.
@@ -80,12 +126,17 @@ PetscErrorCode StepSolver::solve(const State &start, const Step &step, NewtonRep
                                  const Guess *guess) {
   PetscFunctionBeginUser;
   potential_->beginStep(start, step);
+  *report = {};
   PetscCall(findTouching(start, 1)); // blocks begin with their rods, while these are in the cache
-  for (double room = 4;; room *= 4) {
+  report->meets = meetsOthers();
+  for (double room = 4; !report->meets; room *= 4) {
     PetscCall(solveBlocks(start, step, report, seek, guess));
     if (!report->bounded || room > most_room) break;
+    if (on_again) on_again();
     PetscCall(findTouching(start, room));
+    report->meets = meetsOthers();
   }
+  report->converged = report->converged && !report->meets;
   PetscFunctionReturn(0);
 }
 
@@ -104,7 +155,7 @@ PetscErrorCode StepSolver::solveBlocks(const State &start, const Step &step, New
     else
       PetscCall(block.solve(start, &one, seek, guess));
     if (!one.converged) {
-      failed = b < share_.place.size() ? share_.place[b] : double(b);
+      failed = placeOf(b);
       *report = one;
       break;
     }
@@ -136,8 +187,9 @@ void StepSolver::agree(double failed, NewtonReport *report) const {
   team.share(report->reason, from);
   report->converged = false;
   double numbers[] = {double(report->iterations), double(report->lost), double(report->first_negative_pivots),
-                      double(report->shifts)};
+                      double(report->shifts), double(report->bounded)};
   team.share(numbers, from);
+  report->bounded = numbers[4] != 0;
   report->iterations = int(numbers[0]);
   report->lost = numbers[1] != 0;
   report->first_negative_pivots = int(numbers[2]);
@@ -216,7 +268,7 @@ PetscErrorCode StepSolver::criticalMode(int stable, double neutral, Planes *mode
     PetscCall(blocks_[b].criticalMode(stable, &lift, &one));
     if (!(lift > highest)) continue;
     highest = lift;
-    place = b < share_.place.size() ? share_.place[b] : double(b);
+    place = placeOf(b);
     *mode = std::move(one);
   }
   double of_all = highest;
@@ -258,6 +310,7 @@ void NewtonReport::include(const NewtonReport &block) {
   residual.include(block.residual);
   rounding_error = std::max(rounding_error, block.rounding_error);
   lost = lost || block.lost;
+  meets = meets || block.meets;
   if (history.size() < block.history.size()) history.resize(block.history.size(), 0.0);
   for (std::size_t k = 0; k < block.history.size(); ++k) history[k] = std::max(history[k], block.history[k]);
   if (block.converged) return;

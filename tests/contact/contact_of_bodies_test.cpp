@@ -10,8 +10,6 @@
 namespace tendril::test {
 namespace {
 
-constexpr double earth = 9.81;
-
 Body touching(const std::string &name, const std::string &shape, const Vec3 &size, const Vec3 &at,
               const Vec3 &turn = Vec3::Zero()) {
   Body body = shaped(shape, size, at, rotationBy(turn));

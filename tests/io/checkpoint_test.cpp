@@ -38,6 +38,14 @@ public:
       for (ContactMemory &m : of_rod) m = {++count_, ++count_, ++count_, Vec3(1, ++count_, 2), Vec3(++count_, 3, 4)};
     }
   }
+  void operator()(std::vector<std::vector<PairMemory>> &all) {
+    all.resize(elements_.rods.size());
+    for (auto &of_rod : all) {
+      of_rod.resize(std::size_t(2 + count_ % 3));
+      for (PairMemory &m : of_rod)
+        m = {++count_, ++count_, ++count_, ++count_, Vec3(1, ++count_, 2), Vec3(++count_, 3, 4)};
+    }
+  }
   void operator()(std::vector<std::array<Vec3, 2>> &axes) { // of junctions, as many as there are
     for (auto &of_group : axes)
       for (Vec3 &axis : of_group)

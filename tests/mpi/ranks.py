@@ -226,6 +226,66 @@ def group_contact():
         same(f"contact_{method}", "-scene", path, "-integrator", method, "-output_fields", "all,contact_force,contacts,collider_force")
 
 
+def crossings(bodies):
+    """Four blocks of eight cords: those of the first fall on those of the second, and a ball from the third on the fourth."""
+    text = ("gravity: [0, -9.81, 0]\nsimulation: {mode: dynamic, dt: 0.001953125, t_end: 0.046875}\n"
+            f"contact: {{rods: others, bodies: {str(bodies).lower()}, friction: 0.3, distance: 1e-3}}\nrods:\n")
+    for block in range(4):
+        for i in range(8):
+            y, slope = (0.0055 if block == 0 else 0) + (block // 2) * -0.3, 0.2 * (block == 0)
+            x = 0.05 * i + 1.0 * (block == 3)
+            text += (f"  - {{name: r{block}{i}, line: {{from: [{x:.6g}, {y:.6g}, {-slope - 0.1:.6g}], "
+                     f"to: [{x + 0.2 * (block == 0):.6g}, {y:.6g}, {slope + 0.1:.6g}], edges: {100 + i}}}, "
+                     f"material: {{radius: 0.002, young: {1e7 * (1 + i)}, poisson: 0.4, density: {1000 + 10 * block}}}}}\n")
+    text += "supports:\n"
+    for block, i in ((b, i) for b in range(4) for i in range(8)):
+        speed = ", motion: {velocity: [0, -0.5, 0]}" if block == 0 else ""
+        text += "".join(f"  - {{rod: r{block}{i}, vertex: {v}, type: pin{speed}}}\n" for v in ("0", "last"))
+    if bodies:
+        text += ("bodies:\n  - {name: ball, sphere: {radius: 0.02}, density: 500, position: [1.101, -0.275, 0.01], velocity: [0, -0.5, 0]}\n"
+                 "  - {name: stone, sphere: {radius: 0.01}, density: 500, position: [3, 0, 0]}\n"
+                 "constraints:\n  - {name: thread, type: pin, body: stone, rod: r20, vertex: 50, stiffness: 1e-6}\n")
+    return text
+
+
+def near(one, other, label, tolerance=1e-10):
+    """Fields of both files differ by no more than solving leaves."""
+    a, b = contents(one), contents(other)
+    assert a.keys() == b.keys(), f"{label}: {a.keys() ^ b.keys()}"
+    worst = 0
+    for name, x in a.items():
+        if x.dtype.kind == "f" and x.size and "diagnostics" not in name and "rounding" not in name and not name.endswith("_low"):
+            x, y = (np.nan_to_num(v, nan=1e300) for v in (x, b[name]))
+            apart = np.abs(x - y).max() / max(np.abs(x).max(), 1e-30)
+            worst = max(worst, apart)
+            assert apart < tolerance, f"{label}: {name} by {apart:.1e}"
+    return worst
+
+
+def group_touching():
+    """Rods of different ranks come to touch: these go on on one. Their Newton iterations end together then, so answers
+    are the same to what those leave."""
+    for name, bodies, method, ranks_left in (("cords", False, "bdf2", {2: 2, 4: 3}), ("ball", True, "euler", {4: 3})):
+        path = write(name, crossings(bodies))
+        options = ("-scene", path, "-integrator", method, "-snes_rtol", 1e-12, *(("-t_end", 0.0234375) if bodies else ()))
+        launch(1, *options, "-output_dir", f"{name}_1")
+        worst = 0
+        for n in ranks_left:
+            out, _ = launch(n, *options, "-output_dir", f"{name}_{n}")
+            lines = re.findall(r"^ranks: rods or bodies of different ones come near each other: (\d+) of", out, re.M)
+            assert (int(lines[-1]) if lines else n) == ranks_left[n] and (lines or n == 2), (lines, out)
+            with h5py.File(f"{folder}/{name}_{n}/trajectory.h5") as file:
+                assert file["diagnostics/contact"][:].max() > 1e-9, "nothing has touched"
+            for file in ("trajectory.h5", "checkpoint.h5"):
+                worst = max(worst, near(f"{folder}/{name}_1/{file}", f"{folder}/{name}_{n}/{file}", f"{name} on {n} ranks, {file}"))
+            if n == 2 or bodies:
+                continue
+            launch(n, *options, "-t_end", 0.03125, "-output_dir", f"{name}_half")
+            launch(2, *options, "-restart", f"{name}_half", "-output_dir", f"{name}_on")
+            near(f"{folder}/{name}_1/checkpoint.h5", f"{folder}/{name}_on/checkpoint.h5", f"{name}, gone on with from {n} ranks")
+        print(f"{name}: the same on 1, {', '.join(str(n) for n in ranks_left)} ranks to {worst:.1e}", flush=True)
+
+
 def group_statics():
     path = write("statics", lone("{mode: static, load_steps: 4}", damping=False))
     same("statics", "-scene", path, "-output_fields", "all,force,moment,reaction")

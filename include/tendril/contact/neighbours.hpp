@@ -3,6 +3,7 @@
 /// Which edges of rods may touch each other.
 
 #include "tendril/contact/law.hpp"
+#include "tendril/geometry/box.hpp"
 #include "tendril/layout/elements.hpp"
 
 #include <map>
@@ -30,6 +31,8 @@ public:
   /// Whether two edges touch at all: neighbours along a rod do not, or rods would push themselves straight. Those are
   /// apart by less than half a turn of the rod around its own surface, along it and through what joins two rods.
   bool mayTouch(int rod, int edge, int to_rod, int to_edge) const;
+  /// The box in which an edge may be, with its radius and half of what its law reaches.
+  Box boxOf(const Room &room, int rod, int edge) const;
   /// Of the first vertex of an edge, along its rod at rest [m].
   double arc(int rod, int edge) const {
     return arc_[std::size_t(elements_.rods[std::size_t(rod)].first_vertex + edge)];
@@ -49,7 +52,6 @@ private:
   double lengthOf(int rod, int edge) const;
   double alongRod(int rod, int edge, int to_edge) const;
   double toArc(int rod, int edge, double arc) const;
-  std::array<Vec3, 2> boxOf(const Room &room, int rod, int edge) const;
   bool isStraight(const Room &room, int rod, int begin, int end) const;
   bool isApart(const Room &room, int rod, int edge, int to_edge) const;
   bool isNear(const Room &room, int rod, int edge, int to_rod, int to_edge) const;

@@ -45,10 +45,7 @@ struct SlidingPair {
     return pair.number == b.pair.number && side == b.side && sample == b.sample;
   }
 };
-/// What friction does to it, by how both of its sides slide. \param time that the step has taken [s]
-SlidingForce frictionOn(const SlidingPair &p, const ContactSettings &one, const ContactSettings &other, double time,
-                        const Configuration &c);
-/// Adds its derivatives by the variables of the pair.
+/// Adds derivatives of what friction does to it by the variables of the pair.
 void addFriction(const SlidingPair &p, const SlidingForce &force, const Configuration &c, HessianKind kind,
                  OfPair &out);
 

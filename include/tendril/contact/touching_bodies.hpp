@@ -40,6 +40,7 @@ public:
 
   /// Finds what may touch in a step in which rods and bodies go about so far, and how stiff barriers are in it.
   void find(const Configuration &start, const Planes &way, const Step &step, double room);
+  void addRooms(int rod, std::vector<Box> &rooms) const; ///< see Term::addRooms
   /// Finds what touches anew where a rod or a body beside it is not where it has been looked for.
   void cover(const Configuration &c, int rod) const;
   const ByRod<TouchingPair> &pairs() const { return pairs_; }

@@ -31,6 +31,7 @@ public:
 
   /// Finds what may touch in a step whose vertices go about so far, and how stiff barriers are in it.
   void find(const State &state, const Configuration &start, const Planes &way, const Step &step, double room);
+  void addRooms(int rod, std::vector<Box> &rooms) const; ///< see Term::addRooms
   /// Finds what touches anew where a rod is not where it has been looked for.
   void cover(const Configuration &c, int rod) const;
   const ByRod<TouchingPair> &pairs() const { return pairs_; }

@@ -21,7 +21,7 @@ public:
   /// \param settings how the time loop will run; dynamics adds inertia
   PetscErrorCode setUp(Scene scene_to_run, const LoopSettings &settings);
   /// The same in two parts, for a part of a scene that ranks share: all but the solver, on all of them together; and
-  /// the solver, which one of them may fail to set up.
+  /// the solver, which one of them may fail to set up. Both again take the place of what was there.
   PetscErrorCode prepare(Scene part, const LoopSettings &settings, const Team &team);
   PetscErrorCode setUpSolver(const LoopSettings &settings, const Share &share);
   /// Numbering, elements and first state only, for a scene whose steps are solved elsewhere.

@@ -13,7 +13,8 @@ class Slice {
 public:
   Slice() = default;
   /// \param whole the scene \param team of as many ranks as the partition has
-  Slice(const Scene &whole, const Partition &partition, const Team &team);
+  /// \param apart whether what this rank has is a copy even where it is all of the scene
+  Slice(const Scene &whole, const Partition &partition, const Team &team, bool apart = false);
 
   bool isAll() const { return parts_.empty(); }
   /// The part of this rank, with what is asked of the whole.

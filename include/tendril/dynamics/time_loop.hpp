@@ -59,6 +59,9 @@ public:
   using Observer = std::function<PetscErrorCode(const State &, const Diagnostics &)>;
   StepControl control;
   CriticalObserver on_critical; ///< told of each critical point, before the step beyond it
+  /// Called where what different ranks have may touch in the next step, to have it on one: the state and the solver are
+  /// those of what this rank has then, or `stays` is false where that is nothing.
+  std::function<PetscErrorCode(bool *stays)> unite;
   std::function<bool()>
       stops; ///< asked in each step whether to end after it: `finished` is false then, and failure() is empty
   TimeLoop(StepSolver &solver, const LoopSettings &settings)
@@ -103,6 +106,10 @@ private:
     bool too_coarse = false; ///< for the error asked for
     bool stops = false;      ///< whether the run is asked to end
     void commit(const IncrementalPotential &potential, RodSet rods, State *next);
+    void forget() { ///< what was committed
+      energy = {};
+      gap = HUGE_VAL;
+    }
   };
   void prepare(const State &state);
   PetscErrorCode attempt(const State &state, State *next, Attempt *now);

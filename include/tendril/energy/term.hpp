@@ -4,6 +4,7 @@
 /// write one file with a class derived from Term and add one line to makeTerms (terms.cpp).
 
 #include "tendril/energy/cell.hpp"
+#include "tendril/geometry/box.hpp"
 #include "tendril/geometry/exact_sum.hpp"
 #include "tendril/state/stage.hpp"
 
@@ -128,6 +129,8 @@ public:
   /// \param room how much farther they may go than they are expected to, 1 where nothing else is known
   virtual void findTouching(const State & /*state*/, const Configuration & /*start*/, const Planes & /*way*/,
                             const Step & /*step*/, double /*room*/, std::vector<TouchingPair> & /*pairs*/) {}
+  /// Adds boxes: where a rod, and each body beside it, may touch others in the step for which it has looked for pairs.
+  virtual void addRooms(int /*rod*/, std::vector<Box> & /*rooms*/) const {}
   /// Whether a pair that it has found touches, or might after a motion by the width of its law.
   virtual bool nearlyTouch(const TouchingPair & /*pair*/, const Configuration & /*configuration*/) const {
     return false;

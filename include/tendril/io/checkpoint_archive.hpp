@@ -14,7 +14,7 @@ namespace tendril {
 inline constexpr const char *checkpoint_format = "tendril-checkpoint";
 /// 1 had no names, hashes and checksum, 2 no actions of supports, 3 no contact, 4 no friction, 5 no
 /// junctions, 6 no bodies.
-inline constexpr int checkpoint_version = 9;
+inline constexpr int checkpoint_version = 10;
 inline constexpr int most_memory = 8; ///< more than any integrator remembers
 
 /// Writes numbers, texts and arrays by name, and a checksum over all.
@@ -142,6 +142,32 @@ template <class Archive, class AnyState, class Whole> void exchangeContacts(Arch
       for (double n = 0; n < counts[r] && next + 3 <= rows.size(); ++n, next += 3)
         s.contacts[r].push_back(
             {int(rows[next][0]), int(rows[next][1]), int(rows[next][2]), rows[next + 1], rows[next + 2]});
+  }
+}
+
+/// Per rod a number of rows of 4 + 6 numbers (PairMemory).
+template <class Archive, class AnyState, class Whole> void exchangePairs(Archive &a, AnyState &s, Whole &whole) {
+  std::size_t rods = s.pairs.size(), total = 0;
+  std::vector<double> counts, rows;
+  constexpr std::size_t width = 10;
+  for (const auto &of_rod : s.pairs) {
+    counts.push_back(double(of_rod.size()));
+    for (const PairMemory &m : of_rod) {
+      for (const int n : {m.edge, m.to_rod, m.to_edge, m.point}) rows.push_back(n);
+      for (const Vec3 *v : {&m.stick, &m.friction}) rows.insert(rows.end(), v->begin(), v->end());
+    }
+  }
+  total = rows.size();
+  whole("rods_with_pairs", rods, 1e15);
+  whole("pair_numbers", total, 1e15);
+  a.array("pair_counts", counts, rods);
+  a.array("pair_memory", rows, total);
+  if constexpr (Archive::reads) {
+    s.pairs.assign(rods, {});
+    const double *x = rows.data(), *const end = x + rows.size();
+    for (std::size_t r = 0; r < rods; ++r)
+      for (double n = 0; n < counts[r] && x + width <= end; ++n, x += width)
+        s.pairs[r].push_back({int(x[0]), int(x[1]), int(x[2]), int(x[3]), {x[4], x[5], x[6]}, {x[7], x[8], x[9]}});
   }
 }
 

@@ -1,26 +1,16 @@
 #pragma once
 /// \file contact_writer.hpp
-/// The group /contacts of a trajectory: samples in contact, frame after frame.
+/// The groups /contacts and /touching of a trajectory: samples in contact with obstacles, and with rods and bodies.
 
 #include "tendril/contact/contact.hpp"
-#include "tendril/io/hdf5.hpp"
+#include "tendril/contact/pair_readings.hpp"
+#include "tendril/io/row_writer.hpp"
 
 namespace tendril {
 
-/// Rows of all frames one behind the other; `/contacts/end` has for each frame the number of rows up to its last.
-class ContactWriter {
-public:
-  explicit ContactWriter(Hdf5File &file);
-  void append(const std::vector<ContactReading> &readings);
-  void flush();
-  std::size_t waitingBytes() const;
-  /// Lets the datasets go without closing them (see ~TrajectoryWriter).
-  void abandon();
-
-private:
-  std::vector<std::unique_ptr<Hdf5Series>> columns_;
-  std::unique_ptr<Hdf5Series> end_;
-  double rows_ = 0;
-};
+using ContactWriter = RowWriter<ContactReading>;
+using PairWriter = RowWriter<PairReading>;
+std::unique_ptr<ContactWriter> makeContactWriter(Hdf5File &file);
+std::unique_ptr<PairWriter> makePairWriter(Hdf5File &file);
 
 } // namespace tendril

@@ -16,6 +16,7 @@ struct Prepared {
   Slice slice;
   SceneSource source;
   std::vector<std::string> notes, ranks; ///< to be told: of the scene; of how it is dealt out
+  std::shared_ptr<const Scene> all; ///< on every rank, where what different ranks have may come to touch; else null
   Scene written;
   std::vector<Drawing> drawings;
 
@@ -36,8 +37,9 @@ struct Prepared {
 
 /// Reads the scene and sets everything up, on all ranks of the program. \throws SceneError
 void prepare(Prepared &prepared, Options &options);
-/// \throws SceneError where rods lie in obstacles at the time of their state
-void refuseOverlaps(const Simulation &run);
+/// Has what may touch in the next step on one rank each (StepSolver::groups), with its state; a rank that has nothing
+/// then is no longer of the team. \param line what to tell of it
+PetscErrorCode unite(Prepared &prepared, const Options &options, std::string *line);
 /// Chooses the edges, and in dynamics the steps, and makes the scene ready to run with them.
 void meetAccuracy(Prepared &prepared, Options &options, Choice *choice);
 

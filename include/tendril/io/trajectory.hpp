@@ -69,6 +69,7 @@ private:
   std::unique_ptr<Hdf5Series> time_, step_, critical_;
   std::vector<std::unique_ptr<Hdf5Series>> diagnostics_;
   std::unique_ptr<ContactWriter> contacts_; ///< or null
+  std::unique_ptr<PairWriter> touching_;    ///< or null
   bool broken_ = false, finished_ = false; ///< a flush failed, after which HDF5 must not touch the file; all is written
   Clock::time_point flushed_, described_at_; ///< long ago: the first frame goes to the files at once
   std::size_t described_ = 0;                ///< frames in the XDMF file

@@ -31,7 +31,8 @@ struct Partition {
   std::vector<int> order;    ///< rods of the scene; those of an island follow each other
   std::vector<Block> blocks; ///< in that order
   std::vector<int> owner;    ///< rank of each block
-  int ranks = 1;             ///< that have any; no more than there are blocks
+  std::vector<int> group;    ///< the first block that each has to be on one rank with
+  int ranks = 1;             ///< that have any; no more than there are groups of blocks
   bool by_metis = false;
   std::vector<std::int64_t> work;   ///< of each block, in edges; a coupling counts as `coupling_edges`
   std::int64_t most = 0, least = 0; ///< work of a rank
@@ -50,8 +51,8 @@ struct Partition {
 /// node to 350 in a net of 20 x 20 rods (docs/performance.md).
 inline constexpr int coupling_edges = 100;
 
-/// \param ranks that could take part
-Partition partition(const Scene &scene, int ranks, PartitionKind kind);
+/// \param ranks that could take part \param group see Partition; none: any block may be on any rank
+Partition partition(const Scene &scene, int ranks, PartitionKind kind, std::vector<int> group = {});
 
 /// Lines for the user: how many ranks, how even, and which islands are larger than a rank's share.
 std::vector<std::string> describe(const Partition &partition, const Scene &scene, int ranks);

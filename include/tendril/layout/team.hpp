@@ -82,6 +82,8 @@ public:
   void together(const std::function<void()> &work) const;
   /// Numbers of all ranks, one behind the other, on the leading one. \param counts of each rank, needed there only
   std::vector<double> gather(std::span<const double> mine, const std::vector<int> &counts) const;
+  /// The same on all ranks.
+  std::vector<double> gatherAll(std::span<const double> mine) const;
   /// The way back. \param all on the leading rank only
   void scatter(const std::vector<double> &all, const std::vector<int> &counts, std::span<double> mine) const;
   /// Ends all ranks at once, for what only one of them knows.

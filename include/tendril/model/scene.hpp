@@ -165,7 +165,7 @@ struct Scene {
   /// What is asked of the whole scene, where this is the part of it that one rank has: what a run does follows from
   /// all rods, whichever rank has them.
   struct Whole {
-    bool strains_dissipate, slides, has_couples;
+    bool strains_dissipate, slides, has_couples, touches_rods, touches_bodies;
     std::int64_t edges;
   };
   std::optional<Whole> whole;
@@ -183,10 +183,12 @@ struct Scene {
   }
   /// Whether any rod touches others or itself.
   bool touchesRods() const {
+    if (whole) return whole->touches_rods;
     return std::any_of(rods.begin(), rods.end(), [](const Rod &r) { return r.contact.touchesRods(); });
   }
   /// Whether any body touches rods or other bodies.
   bool touchesBodies() const {
+    if (whole) return whole->touches_bodies;
     const auto touches = [](const auto &of) { return of.contact.touchesBodies(); };
     const auto count = std::count_if(bodies.begin(), bodies.end(), touches);
     return count > 1 || (count == 1 && std::any_of(rods.begin(), rods.end(), touches));
@@ -201,8 +203,10 @@ struct Scene {
   }
   /// Whether a rod may touch obstacles.
   bool touches(int rod) const { return !colliders.empty() && rods[rod].contact.on; }
-  /// Whether friction or damping acts on any.
+  /// Whether friction or damping with obstacles acts on any rod.
   bool slides() const;
+  /// Whether any of a rod acts at all.
+  bool hasFriction() const { return slides() || slidesAmongMoving(); }
 };
 
 /// The scene with some of its rods only, in any order, and what holds, joins and pulls them.

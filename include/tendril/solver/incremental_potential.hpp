@@ -45,6 +45,8 @@ public:
   /// with its rods, which makes islands of them.
   bool touches() const { return touches_; }
   void findTouching(const State &start, double room);
+  /// Boxes in which some rods and their bodies may touch others in the step for which that was found.
+  std::vector<Box> roomsOf(RodSet rods) const;
   /// See Term::nearlyTouch, at the iterate.
   bool nearlyTouch(const TouchingPair &pair) const;
   /// See Term::timesBounded.

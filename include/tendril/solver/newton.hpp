@@ -32,6 +32,7 @@ struct NewtonReport {
   double rounding_error = 0;
   bool lost = false;           ///< in rounding: the failure of the step
   bool bounded = false;        ///< rods left the room in which contact between them is known: the failure of the step
+  bool meets = false;          ///< what different ranks have may touch: nothing has been solved
   std::vector<double> history; ///< force residual, relative to the load scale, at every iterate
   std::string reason;          ///< in words
   /// Whether Newton may have come to an unstable equilibrium, or passed it and only met indefinite Hessians.

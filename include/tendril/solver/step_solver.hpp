@@ -23,6 +23,8 @@ struct Share {
   Team team;
   std::vector<RodSet> blocks; ///< of rods that are solved together; none: as blocksOf
   std::vector<double> place;  ///< of each block among those of all ranks
+  std::vector<int> owner; ///< rank of each block of all, where those of different ranks may come to touch; else none
+  std::vector<int> group; ///< as Partition, with owners
 };
 
 class StepSolver {
@@ -31,13 +33,19 @@ public:
   PetscErrorCode setUp(IncrementalPotential &potential, Coupling coupling = Coupling::none, const Share &share = {});
   /// Minimises the potential of the step, on all ranks. The potential's iterate is the answer when `report` says
   /// converged; iterations are the most of any block. After a failure the report is that of the first block that
-  /// failed. In statics, where fine rods take many iterations, they begin again from the answer with fewer edges
-  /// (solveCoarse). \param guess where to begin instead of at the start state
+  /// failed; where rods or bodies of different ranks may touch, nothing is solved. In statics, where fine rods take
+  /// many iterations, they begin again from the answer with fewer edges (solveCoarse). \param guess where to begin
+  /// instead of at the start state
   PetscErrorCode solve(const State &start, const Step &step, NewtonReport *report, Seek seek = Seek::minimum,
                        const Guess *guess = nullptr);
+  /// After a report that says `meets`: groups of blocks that have to be on one rank each, as Partition.
+  const std::vector<int> &groups() const { return share_.group; }
   bool coarse_first = false; ///< whether fine rods begin from fewer edges without a try of their own
   /// Called with each block that has converged, while it is in the cache.
   std::function<void(RodSet)> on_block;
+  /// Called where rods have left the room in which contact is known and the step is solved anew: what on_block has been
+  /// told is void.
+  std::function<void()> on_again;
   /// Starts a step without solving it.
   PetscErrorCode begin(const State &start, const Step &step);
   /// Sets the linear solvers up as a step would, so that their options have been asked for before the first step.
@@ -66,6 +74,8 @@ private:
 
   PetscErrorCode solveBlocks(const State &start, const Step &step, NewtonReport *report, Seek seek, const Guess *guess);
   void agree(double failed, NewtonReport *report) const;
+  double placeOf(std::size_t block) const;
+  bool meetsOthers();
   PetscErrorCode solveBlock(NewtonSolver &block, const State &start, NewtonReport *report);
   PetscErrorCode setUpBlocks(const std::vector<RodSet> &blocks);
   std::vector<RodSet> wantedBlocks() const;
