@@ -175,7 +175,7 @@ PetscErrorCode measure(const Request &request, Measured *m) {
   PetscCall(simulation.setUp(std::move(scene), settings));
   PetscCall(simulation.solver.rehearse(simulation.state, TimeLoop::stepOf(settings, simulation.state, settings.dt)));
   std::vector<std::string> unused;
-  PetscCall(unusedOptions(&unused));
+  PetscCall(unusedOptions(false, &unused));
   if (!unused.empty()) refuseUnused(unused.front());
   m->rods = int(simulation.scene.rods.size());
   m->edges = 0;

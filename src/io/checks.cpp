@@ -2,6 +2,7 @@
 
 #include "tendril/contact/contact.hpp"
 #include "tendril/contact/touching_bodies.hpp"
+#include "tendril/contact/touching_rods.hpp"
 #include "tendril/dynamics/arc_length.hpp"
 #include "tendril/io/text.hpp"
 
@@ -238,6 +239,13 @@ std::vector<std::string> notesOnContact(const Simulation &run) {
           "warning: rod '" + run.scene.rods[r].name + "' has edges of up to " + shortText(edge / contact.radius) +
           " of its radii: it may miss obstacles that are smaller, and is felt as a chain of straight pieces; "
           "take shorter edges");
+    if (const double apart = edge / most_samples, wanted = spacingOfSamples(contact.radius, contact.distance);
+        contact.touchesRods() && contact.isBarrier() && apart > 1.01 * wanted)
+      notes.push_back(
+          "warning: rod '" + run.scene.rods[r].name + "' has edges of up to " + shortText(edge) +
+          " m and feels other rods at points " + shortText(apart) + " m apart, where its barrier of " +
+          shortText(contact.distance) + " m wants " + shortText(wanted) +
+          " m: other rods may stop between them; take shorter edges or a larger 'contact: {distance: ...}'");
     if (contact.quadrature == 0) continue;
     const double apart = edge / contact.quadrature;
     for (const Collider &c : run.scene.colliders)

@@ -161,9 +161,6 @@ std::set<std::string> readFields(const Texts &texts) {
   return fields;
 }
 
-/// Prefixes of PETSc's options that are asked for only when the program ends.
-constexpr const char *late_options[] = {"log_", "options_", "malloc", "help", "on_error"};
-
 /// Options of PETSc with which its solvers run, but not to an answer of ours.
 PetscErrorCode refuseUnsuited() {
   struct Unsuited {
@@ -372,14 +369,16 @@ std::vector<int> edgesAsked(const Scene &scene, const Options &o) {
   return edges;
 }
 
-PetscErrorCode unusedOptions(std::vector<std::string> *unused) {
+PetscErrorCode unusedOptions(bool touches, std::vector<std::string> *unused) {
   PetscInt n;
   char **names, **values;
+  std::vector<std::string> late{"log_", "options_", "malloc", "help", "on_error"}; // asked for when the program ends
   PetscFunctionBeginUser;
+  if (touches) late.emplace_back("mat_mumps_"); // in steps in which rods touch
   PetscCall(PetscOptionsLeftGet(nullptr, &n, &names, &values));
   for (PetscInt i = 0; i < n; ++i)
-    if (const std::string name = names[i]; std::none_of(std::begin(late_options), std::end(late_options),
-                                                        [&](const char *p) { return name.rfind(p, 0) == 0; }))
+    if (const std::string name = names[i];
+        std::none_of(late.begin(), late.end(), [&](const std::string &p) { return name.rfind(p, 0) == 0; }))
       unused->push_back(name);
   PetscCall(PetscOptionsLeftRestore(nullptr, &n, &names, &values));
   PetscFunctionReturn(0);

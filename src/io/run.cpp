@@ -168,10 +168,10 @@ void tellStop(const State &state, const Options &o, int exit_code, const std::st
 }
 
 /// The first option that no rank has asked for: not all have the same solvers.
-PetscErrorCode findUnused(const Team &team, std::string *unused) {
+PetscErrorCode findUnused(const Team &team, bool touches, std::string *unused) {
   PetscFunctionBeginUser;
   std::vector<std::string> mine;
-  PetscCall(unusedOptions(&mine));
+  PetscCall(unusedOptions(touches, &mine));
   std::string names;
   for (const std::string &name : mine) names += name + '\n';
   team.share(names);
@@ -273,7 +273,7 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   if (o.help) PetscFunctionReturn(0);
   Begun begun;
   std::string unknown;
-  if (!prepared.team.isEmpty()) PetscCall(findUnused(prepared.team, &unknown)); // others have asked for none
+  if (!prepared.team.isEmpty()) PetscCall(findUnused(prepared.team, prepared.run->scene.touchesMoving(), &unknown));
   world.together([&] {
     if (!unknown.empty()) refuseUnused(unknown);
     if (!world.leads()) return;

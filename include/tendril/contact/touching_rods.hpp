@@ -25,6 +25,13 @@ struct Touching {
   int other() const { return 2 - 2 * side; } ///< where the vertices of the other edge begin
 };
 
+/// How far apart samples of an edge lie at most that touches another [m], where no more than so many are asked for.
+/// \param thinner radius of both rods \param width of the barrier between them, or what stands for it [m]
+inline double spacingOfSamples(double thinner, double width) {
+  return thinner * std::sqrt(std::min(1.0, width / (0.2 * thinner))) / 3;
+}
+inline constexpr double most_samples = 1000; ///< of an edge
+
 class TouchingRods {
 public:
   TouchingRods(const Scene &scene, const Elements &elements);
@@ -129,14 +136,13 @@ void TouchingRods::visit(const TouchingPair &p, const std::array<Vec3, 4> &x, do
   const double radii = radiiOf(p);
   if (farApart(x) > radii + reach) return;
   if (isCloud(p)) return visitCloud(p, x, reach, visit);
-  const double thinner = std::min(settings(p.rod).radius, settings(p.to_rod).radius),
-               fine = std::sqrt(std::min(1.0, widthOf(p) / (0.2 * thinner)));
+  const double apart = spacingOfSamples(std::min(settings(p.rod).radius, settings(p.to_rod).radius), widthOf(p));
   for (const int side : {0, 1}) {
     const std::size_t own = std::size_t(2 * side), other = 2 - own;
     const int rod = side == 0 ? p.rod : p.to_rod, edge = side == 0 ? p.edge : p.to_edge;
     const double rest = elements_.restLength()[elements_.rods[std::size_t(rod)].slot(edge)];
-    constexpr double most = 1000, alike = 1 - 1e-9; // edges whose lengths differ by rounding have as many
-    const int count = int(std::clamp(std::ceil(alike * rest / (thinner * fine / 3)), 1.0, most));
+    constexpr double alike = 1 - 1e-9; // edges whose lengths differ by rounding have as many
+    const int count = int(std::clamp(std::ceil(alike * rest / apart), 1.0, most_samples));
     const Vec3 along = x[own + 1] - x[own];
     const double spacing = along.norm() / count;
     for (int k = 0; k <= count;) {
@@ -146,7 +152,7 @@ void TouchingRods::visit(const TouchingPair &p, const std::array<Vec3, 4> &x, do
       Touching t;
       t.gap = near.distance - radii;
       if (!(t.gap < reach)) {
-        k += 1 + int(std::min(most, 0.999 * (t.gap - reach) / spacing));
+        k += 1 + int(std::min(most_samples, 0.999 * (t.gap - reach) / spacing));
         continue;
       }
       t.side = side;

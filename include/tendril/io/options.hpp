@@ -55,7 +55,8 @@ void resolve(const RunSettings &scene, Options &options);
 std::vector<int> edgesAsked(const Scene &scene, const Options &options);
 
 /// Options that nobody has asked for, in the order of the command line; call when the solvers are set up.
-PetscErrorCode unusedOptions(std::vector<std::string> *unused);
+/// \param touches whether rods may come to touch each other, which MUMPS solves then
+PetscErrorCode unusedOptions(bool touches, std::vector<std::string> *unused);
 /// \throws SceneError with what may have been meant
 [[noreturn]] void refuseUnused(const std::string &option);
 
