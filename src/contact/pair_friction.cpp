@@ -6,14 +6,14 @@ namespace tendril {
 
 /// What a sample remembers, or null; where it was at the edge beside, for it slides along.
 static const PairMemory *find(const std::vector<PairMemory> &memory, const SlidingPair &p) {
-  const TouchingPair &pair = p.pair;
+  const int edge = p.pair.edgeOf(p.side), to_rod = p.pair.rodOf(1 - p.side), to_edge = p.pair.edgeOf(1 - p.side);
   const PairMemory *beside = nullptr;
-  auto m = std::lower_bound(memory.begin(), memory.end(), pair.edge,
-                            [](const PairMemory &one, int edge) { return one.edge < edge; });
-  for (; m != memory.end() && m->edge == pair.edge; ++m) {
-    if (m->to_rod != pair.to_rod || m->point != p.point.point) continue;
-    if (m->to_edge == pair.to_edge) return &*m;
-    if (pair.to_edge >= 0 && std::abs(m->to_edge - pair.to_edge) == 1) beside = &*m;
+  auto m =
+      std::lower_bound(memory.begin(), memory.end(), edge, [](const PairMemory &one, int of) { return one.edge < of; });
+  for (; m != memory.end() && m->edge == edge; ++m) {
+    if (m->to_rod != to_rod || m->point != p.sample) continue;
+    if (m->to_edge == to_edge) return &*m;
+    if (to_edge >= 0 && std::abs(m->to_edge - to_edge) == 1) beside = &*m;
   }
   return beside;
 }
@@ -31,12 +31,11 @@ void PairFriction::begin(const State &state, const Configuration &start, const S
 
 void PairFriction::complete(SlidingPair *p) const {
   SlidingPoint &point = p->point;
-  point.point = 2 * p->sample + p->side;
   point.coefficient = bothSlide(settingsOf(p->pair, 0), settingsOf(p->pair, 1)).friction;
   point.start = wayBetween(p->pair, p->side, p->own, p->other, *start_);
   const bool anchored = isAnchored(p->pair);
   if (!anchored && !holds(p->pair.rod)) return;
-  const PairMemory *const found = find(of_[std::size_t(p->pair.rod)].before, *p);
+  const PairMemory *const found = find(of_[std::size_t(p->pair.rodOf(p->side))].before, *p);
   if (!found) return;
   point.held = found->friction;
   if (anchored) point.stick = found->stick - point.normal.dot(found->stick) * point.normal;
@@ -48,23 +47,27 @@ SlidingForce PairFriction::forceOn(const SlidingPair &p, bool holds, const Confi
                       wayBetween(p.pair, p.side, p.own, p.other, c) - p.point.start);
 }
 
-/// Where a point slides, its anchor follows within the fall-off.
+/// Where a point slides, its anchor follows within the fall-off. A rod has pairs with those before it, which have
+/// forgotten what was before them already.
 void PairFriction::commit(State &state, const Configuration &c, int r) const {
   if (!slides_) return;
   state.pairs.resize(scene_.rods.size());
-  std::vector<PairMemory> &memory = state.pairs[std::size_t(r)];
-  std::erase_if(memory, [&](const PairMemory &m) { return (m.edge >= 0 && m.to_edge >= 0) == of_rods_; });
+  std::erase_if(state.pairs[std::size_t(r)],
+                [&](const PairMemory &m) { return (m.edge >= 0 && m.to_edge >= 0) == of_rods_; });
   for (const SlidingPair &p : points(r)) {
-    PairMemory m{p.pair.edge, p.pair.to_rod, p.pair.to_edge, p.point.point, Vec3::Zero(), -forceOn(p, c).gradient};
+    PairMemory m{p.pair.edgeOf(p.side), p.pair.rodOf(1 - p.side), p.pair.edgeOf(1 - p.side), p.sample,
+                 Vec3::Zero(),          -forceOn(p, c).gradient};
     if (isAnchored(p.pair)) {
       const ContactSettings both = bothSlide(settingsOf(p.pair, 0), settingsOf(p.pair, 1));
       const Vec3 way = wayBetween(p.pair, p.side, p.own, p.other, c) - p.point.start,
                  drawn = way - p.point.normal.dot(way) * p.point.normal + p.point.stick;
       m.stick = drawn * std::min(1.0, slidingOf(p, both, false).fall_off / std::max(drawn.norm(), 1e-300));
     }
-    memory.push_back(m);
+    std::vector<PairMemory> &memory = state.pairs[std::size_t(p.pair.rodOf(p.side))];
+    memory.insert(std::upper_bound(memory.begin(), memory.end(), m,
+                                   [](const PairMemory &a, const PairMemory &b) { return a.key() < b.key(); }),
+                  m);
   }
-  std::sort(memory.begin(), memory.end(), [](const PairMemory &a, const PairMemory &b) { return a.key() < b.key(); });
 }
 
 } // namespace tendril

@@ -18,8 +18,8 @@ PairReading readingOf(const TouchingPair &p, int side, int sample, const State &
     reading.at[at] = NAN;
   }
   if (state.pairs.empty()) return reading;
-  const auto key = std::tuple(p.edge, p.to_rod, p.to_edge, 2 * sample + side);
-  for (const PairMemory &m : state.pairs[std::size_t(p.rod)])
+  const auto key = std::tuple(p.edgeOf(side), p.rodOf(1 - side), p.edgeOf(1 - side), sample);
+  for (const PairMemory &m : state.pairs[std::size_t(p.rodOf(side))])
     if (m.key() == key) reading.friction = m.friction;
   return reading;
 }
@@ -48,8 +48,8 @@ void addOfRods(const Scene &scene, const Elements &elements, const State &state,
 }
 
 void addOfBodies(const Scene &scene, const Elements &elements, const State &state, const Configuration &c,
-                 std::vector<PairReading> &readings) {
-  const TouchingBodies bodies(scene, elements);
+                 bool is_static, std::vector<PairReading> &readings) {
+  const TouchingBodies bodies(scene, elements, is_static);
   bodies.cover(c, 0);
   bodies.visit(c, {0, int(scene.rods.size())}, [&](const TouchingPair &p, const TouchingSolid &t) {
     const int solid = p.body(t.solid());
@@ -68,10 +68,10 @@ void addOfBodies(const Scene &scene, const Elements &elements, const State &stat
 } // namespace
 
 std::vector<PairReading> pairReadings(const Scene &scene, const Elements &elements, const State &state,
-                                      const Configuration &c) {
+                                      const Configuration &c, bool is_static) {
   std::vector<PairReading> readings;
   if (scene.touchesRods()) addOfRods(scene, elements, state, c, readings);
-  if (scene.touchesBodies()) addOfBodies(scene, elements, state, c, readings);
+  if (scene.touchesBodies()) addOfBodies(scene, elements, state, c, is_static, readings);
   return readings;
 }
 

@@ -14,8 +14,9 @@ static double distanceAt(const Shape &shape, const Vec3 &x) {
   return distance;
 }
 
-TouchingBodies::TouchingBodies(const Scene &scene, const Elements &elements)
-    : scene_(scene), elements_(elements), solids_(scene.bodies.size()), bounded_(scene.rods.size(), 0) {
+TouchingBodies::TouchingBodies(const Scene &scene, const Elements &elements, bool is_static)
+    : scene_(scene), elements_(elements), solids_(scene.bodies.size()), static_(is_static),
+      bounded_(scene.rods.size(), 0) {
   for (std::size_t b = 0; b < solids_.size(); ++b) {
     const Body &body = scene.bodies[b];
     if (!body.contact.touchesBodies()) continue;

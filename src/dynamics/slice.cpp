@@ -31,8 +31,9 @@ Slice::Slice(const Scene &whole, const Partition &partition, const Team &team, b
 
 Scene Slice::sceneOf(const Scene &whole) const {
   Scene own = withRods(whole, parts_[team_.rank()].rods);
-  own.whole = {whole.strainsDissipate(), whole.slides(),        whole.hasCouples(),
-               whole.touchesRods(),      whole.touchesBodies(), whole.edges()};
+  own.whole = {
+      whole.strainsDissipate(),  whole.slides(), whole.hasCouples(), whole.touchesRods(), whole.touchesBodies(),
+      whole.slidesAmongMoving(), whole.edges()};
   return own;
 }
 

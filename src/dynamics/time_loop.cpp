@@ -218,6 +218,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
   PetscFunctionBeginUser;
   PetscLogDouble begin, now;
   PetscCall(PetscTime(&begin));
+  bool begun_here = std::isnan(control.energy); // no step has been taken yet, and the energy of the start is ours
   prepare(state);
   Work work;                     // since the last row
   int rejected = 0, in_vain = 0; // steps since then, and their iterations
@@ -240,6 +241,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     PetscCall(attempt(state, &next, &step));
     if (step.report.meets) {
       if (begins) state.memory.clear(); // of rods that did not know of each other
+      if (begun_here) control.energy = NAN;
       bool stays;
       PetscCall(unite(&stays));
       if (!stays) PetscFunctionReturn(0);
@@ -272,6 +274,7 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
       PetscFunctionReturn(0);
     }
     accept(state, next, &step, &work);
+    begun_here = false;
     lengthen(step.report);
     Diagnostics row = rowOf(state, step, std::exchange(work, {}));
     row.rejected_steps = std::exchange(rejected, 0);

@@ -257,7 +257,10 @@ static void readContact(YamlMap &map, const ContactSettings &of_scene, Body &bod
   contact.fall_off_velocity = of_scene.fall_off_velocity;
   contact.tangential_damping = of_scene.tangential_damping;
   contact.normal_damping = of_scene.normal_damping;
-  contact.distance = 0.02 * std::sqrt(body.own.inertia.trace() / body.own.mass);
+  contact.stick = of_scene.stick;
+  const double gyration = std::sqrt(body.own.inertia.trace() / body.own.mass);
+  contact.slip_length = of_scene.slip_length > 0 ? of_scene.slip_length : 1e-4 * gyration;
+  contact.distance = 0.02 * gyration;
   if (!map.has("bodies[].contact")) return;
   const YamlValue value = map.at("bodies[].contact");
   if (!contact.on) value.fail("a body without a shape (" + std::string(shape_names) + ") touches nothing; give it one");

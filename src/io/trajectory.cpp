@@ -267,7 +267,8 @@ void TrajectoryWriter::writeFrame(const State &state) {
   }
   if (contacts_) contacts_->append(snapshot.contacts);
   if (touching_)
-    touching_->append(pairReadings(scene_, elements_, state, configurationOf(state, scene_, elements_, state.time)));
+    touching_->append(
+        pairReadings(scene_, elements_, state, configurationOf(state, scene_, elements_, state.time), !dynamic_));
   for (const Collider &c : wanted(From::motion) ? scene_.colliders : std::vector<Collider>()) {
     const Collider::Pose pose = c.poseAt(state.time);
     snapshot.collider_position.push_back(pose.position);

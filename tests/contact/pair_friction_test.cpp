@@ -42,8 +42,8 @@ Drawn drawAlong(double coefficient) {
     drawn.moved += 0.5 * moved[0];
     drawn.held -= spring * moved;
   }
-  for (const PairReading &reading :
-       pairReadings(sim.scene, *sim.elements, sim.state, configurationOf(sim.state, sim.scene, *sim.elements, 1))) {
+  for (const PairReading &reading : pairReadings(sim.scene, *sim.elements, sim.state,
+                                                 configurationOf(sim.state, sim.scene, *sim.elements, 1), true)) {
     const double sign = reading.rod[0] == 1 ? 1 : -1;
     drawn.normal += sign * reading.force;
     drawn.friction += sign * reading.friction;
@@ -115,7 +115,7 @@ TEST(PairReadings, AreTheForcesOfTheTerm) {
   d.blocks.setTouching(pairs.size());
   contact->addBetween(c, {0, 2}, d, HessianKind::none);
   std::vector<Vec3> force(std::size_t(sim.elements->vertices()), Vec3::Zero());
-  for (const PairReading &reading : pairReadings(sim.scene, *sim.elements, sim.state, c))
+  for (const PairReading &reading : pairReadings(sim.scene, *sim.elements, sim.state, c, false))
     for (const std::size_t side : {0, 1}) {
       const RodRange &rod = sim.elements->rods[std::size_t(reading.rod[side])];
       const std::size_t v = std::size_t(rod.first_vertex + reading.edge[side]);

@@ -91,6 +91,26 @@ TEST(Partition, UnevenRodsAreEvenedOut) {
   EXPECT_EQ(even.owner, partition(scene, 16, PartitionKind::automatic).owner); // each time the same
 }
 
+/// Blocks stay what they are; those of a group come to one rank, and no more ranks have any than there are groups.
+TEST(Partition, GroupsOfBlocksAreOnOneRank) {
+  const Scene scene = lines(std::vector<int>(200, 37));
+  const Partition alone = partition(scene, 1, PartitionKind::automatic);
+  const int blocks = int(alone.blocks.size());
+  ASSERT_GT(blocks, 6);
+  std::vector<int> group = alone.group;
+  group[3] = group[5] = 0;
+  for (const PartitionKind kind : {PartitionKind::contiguous, PartitionKind::metis}) {
+    const Partition p = partition(scene, 4, kind, group);
+    expectWhole(p, scene);
+    ASSERT_EQ(int(p.blocks.size()), blocks);
+    EXPECT_EQ(p.owner[3], p.owner[0]);
+    EXPECT_EQ(p.owner[5], p.owner[0]);
+    EXPECT_EQ(p.ranks, 4);
+  }
+  for (int b = 2; b < blocks; ++b) group[std::size_t(b)] = 0;
+  EXPECT_EQ(partition(scene, 4, PartitionKind::automatic, group).ranks, 2);
+}
+
 TEST(Partition, OneRodThatIsJoinedToItselfIsABlock) {
   Scene scene = lines({50, 50, 50});
   scene.junctions.push_back({"j", {{1, 0, -1}, {1, 50, -1}}, 0});

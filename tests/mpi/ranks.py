@@ -227,16 +227,18 @@ def group_contact():
 
 
 def crossings(bodies):
-    """Four blocks of eight cords: those of the first fall on those of the second, and a ball from the third on the fourth."""
+    """Four blocks of eight cords: those of the first are drawn down on those of the second, with friction, and a ball falls
+    on the last."""
     text = ("gravity: [0, -9.81, 0]\nsimulation: {mode: dynamic, dt: 0.001953125, t_end: 0.046875}\n"
-            f"contact: {{rods: others, bodies: {str(bodies).lower()}, friction: 0.3, distance: 1e-3}}\nrods:\n")
+            f"contact: {{rods: others, bodies: {str(bodies).lower()}, distance: 1e-3}}\nrods:\n")
     for block in range(4):
         for i in range(8):
             y, slope = (0.0055 if block == 0 else 0) + (block // 2) * -0.3, 0.2 * (block == 0)
             x = 0.05 * i + 1.0 * (block == 3)
             text += (f"  - {{name: r{block}{i}, line: {{from: [{x:.6g}, {y:.6g}, {-slope - 0.1:.6g}], "
                      f"to: [{x + 0.2 * (block == 0):.6g}, {y:.6g}, {slope + 0.1:.6g}], edges: {100 + i}}}, "
-                     f"material: {{radius: 0.002, young: {1e7 * (1 + i)}, poisson: 0.4, density: {1000 + 10 * block}}}}}\n")
+                     f"material: {{radius: 0.002, young: {1e7 * (1 + i)}, poisson: 0.4, density: {1000 + 10 * block}}}"
+                     f"{', contact: {friction: 0.3}' if block < 2 else ''}}}\n")
     text += "supports:\n"
     for block, i in ((b, i) for b in range(4) for i in range(8)):
         speed = ", motion: {velocity: [0, -0.5, 0]}" if block == 0 else ""

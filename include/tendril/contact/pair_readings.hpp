@@ -19,8 +19,8 @@ struct PairReading {
   Vec3 force;                         ///< of the normal law, on the one that has the sample [N]
   Vec3 friction;                      ///< the same of friction and damping, in the step that led to the state [N]
 };
-/// \param c of the state
+/// \param c of the state \param is_static whether statics led to it
 std::vector<PairReading> pairReadings(const Scene &scene, const Elements &elements, const State &state,
-                                      const Configuration &c);
+                                      const Configuration &c, bool is_static);
 
 } // namespace tendril

@@ -36,7 +36,8 @@ std::vector<BodyMeeting> tightestAmongBodies(const Scene &scene, const Elements 
 /// from where it is tied to a body on until it has left it.
 class TouchingBodies {
 public:
-  TouchingBodies(const Scene &scene, const Elements &elements);
+  /// \param is_static before the first step that it is told of
+  TouchingBodies(const Scene &scene, const Elements &elements, bool is_static = false);
 
   /// Finds what may touch in a step in which rods and bodies go about so far, and how stiff barriers are in it.
   void find(const Configuration &start, const Planes &way, const Step &step, double room);

@@ -165,7 +165,7 @@ struct Scene {
   /// What is asked of the whole scene, where this is the part of it that one rank has: what a run does follows from
   /// all rods, whichever rank has them.
   struct Whole {
-    bool strains_dissipate, slides, has_couples, touches_rods, touches_bodies;
+    bool strains_dissipate, slides, has_couples, touches_rods, touches_bodies, slides_among_moving;
     std::int64_t edges;
   };
   std::optional<Whole> whole;
@@ -197,6 +197,7 @@ struct Scene {
   bool touchesMoving() const { return touchesRods() || touchesBodies(); }
   /// Whether friction or damping acts between any of these.
   bool slidesAmongMoving() const {
+    if (whole) return whole->slides_among_moving;
     const auto slides = [](const auto &of) { return of.contact.touchesMoving() && of.contact.slides(); };
     return touchesMoving() &&
            (std::any_of(rods.begin(), rods.end(), slides) || std::any_of(bodies.begin(), bodies.end(), slides));

@@ -40,13 +40,13 @@ struct ContactMemory {
   auto key() const { return std::tuple(edge, collider, point); }
 };
 
-/// What a sample of a rod or body remembers that touches another at the end of a step. Edges and bodies are named as in
-/// TouchingPair.
+/// What a sample of a rod, or of a body beside it, remembers that touches another at the end of a step. Edges and
+/// bodies are named as in TouchingPair.
 struct PairMemory {
-  int edge, to_rod, to_edge; ///< of the rod that has the pair; the other
-  int point;                 ///< twice the sample, and 1 where it is one of the other
+  int edge, to_rod, to_edge; ///< whose sample it is; what it touches
+  int point;                 ///< which sample
   Vec3 stick;                ///< what sticks has been drawn so far from its anchor [m]
-  Vec3 friction;             ///< on that whose sample it is, with the damping of the contact [N]
+  Vec3 friction;             ///< on it, with the damping of the contact [N]
   bool operator==(const PairMemory &) const = default;
   auto key() const { return std::tuple(edge, to_rod, to_edge, point); }
 };
@@ -91,7 +91,7 @@ struct State {
   /// What samples of each rod that touched an obstacle at the end of the last step remember, in order; where friction
   /// acts on any rod.
   std::vector<std::vector<ContactMemory>> contacts;
-  /// The same of samples that touched rods or bodies, by the rods that have their pairs.
+  /// The same of samples that touched rods or bodies.
   std::vector<std::vector<PairMemory>> pairs;
 
   bool operator==(const State &) const = default;
