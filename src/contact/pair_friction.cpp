@@ -29,9 +29,18 @@ void PairFriction::begin(const State &state, const Configuration &start, const S
   }
 }
 
+const ContactSettings &PairFriction::bothOf(const TouchingPair &p) const {
+  const std::pair<int, int> key = p.things();
+  auto found = both_.find(key);
+  if (found == both_.end())
+    found = both_.emplace(key, bothSlide(settingsOf(scene_, p, 0), settingsOf(scene_, p, 1))).first;
+  return found->second;
+}
+
 void PairFriction::complete(SlidingPair *p) const {
   SlidingPoint &point = p->point;
-  point.coefficient = bothSlide(settingsOf(p->pair, 0), settingsOf(p->pair, 1)).friction;
+  p->both = &bothOf(p->pair);
+  point.coefficient = p->both->friction;
   point.start = wayBetween(p->pair, p->side, p->own, p->other, *start_);
   const bool anchored = isAnchored(p->pair);
   if (!anchored && !holds(p->pair.rod)) return;
@@ -42,8 +51,7 @@ void PairFriction::complete(SlidingPair *p) const {
 }
 
 SlidingForce PairFriction::forceOn(const SlidingPair &p, bool holds, const Configuration &c) const {
-  const ContactSettings both = bothSlide(settingsOf(p.pair, 0), settingsOf(p.pair, 1));
-  return slidingForce(p.point, both, slidingOf(p, both, holds),
+  return slidingForce(p.point, *p.both, slidingOf(p, holds),
                       wayBetween(p.pair, p.side, p.own, p.other, c) - p.point.start);
 }
 
@@ -58,10 +66,9 @@ void PairFriction::commit(State &state, const Configuration &c, int r) const {
     PairMemory m{p.pair.edgeOf(p.side), p.pair.rodOf(1 - p.side), p.pair.edgeOf(1 - p.side), p.sample,
                  Vec3::Zero(),          -forceOn(p, c).gradient};
     if (isAnchored(p.pair)) {
-      const ContactSettings both = bothSlide(settingsOf(p.pair, 0), settingsOf(p.pair, 1));
       const Vec3 way = wayBetween(p.pair, p.side, p.own, p.other, c) - p.point.start,
                  drawn = way - p.point.normal.dot(way) * p.point.normal + p.point.stick;
-      m.stick = drawn * std::min(1.0, slidingOf(p, both, false).fall_off / std::max(drawn.norm(), 1e-300));
+      m.stick = drawn * std::min(1.0, slidingOf(p, false).fall_off / std::max(drawn.norm(), 1e-300));
     }
     std::vector<PairMemory> &memory = state.pairs[std::size_t(p.pair.rodOf(p.side))];
     memory.insert(std::upper_bound(memory.begin(), memory.end(), m,

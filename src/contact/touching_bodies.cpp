@@ -250,7 +250,7 @@ std::span<const SamplePoint> TouchingBodies::pointsFor(int r, int b) const {
 /// Of an edge and a body as wide as that of the rod, with what presses on either; of two bodies as wide as both in the
 /// mean, and as stiff as the stiffer one.
 NormalLaw TouchingBodies::makeLaw(const TouchingPair &p) const {
-  const auto borne = borne_.find(thingsOf(p));
+  const auto borne = borne_.find(p.things());
   const double part = borne == borne_.end() ? 1 : borne->second;
   if (p.isOfBodies()) {
     ContactSettings both = settingsOf(p, 0);
@@ -272,7 +272,7 @@ void TouchingBodies::bearAsDrawn() {
   take();
   std::map<std::pair<int, int>, double> pressed, load;
   for (const TouchingPair &p : pairs_.items) {
-    const auto key = thingsOf(p);
+    const auto key = p.things();
     double least_load = HUGE_VAL;
     bool fixed = !p.isOfBodies();
     for (const int side : {0, 1}) {
@@ -350,7 +350,7 @@ std::vector<BodyMeeting> TouchingBodies::tightest(const Configuration &c) const 
   std::map<std::pair<int, int>, BodyMeeting> least;
   for (const TouchingPair &p : pairs_.items)
     visit(p, c, lawOf(p).reach(), [&](const TouchingSolid &t) {
-      BodyMeeting &m = least[thingsOf(p)];
+      BodyMeeting &m = least[p.things()];
       if (t.gap >= m.gap) return;
       m = {-1, -1, p.body(t.solid()), t.gap, 0, wallOf(p), widthOf(p)};
       if (p.isBody(t.side)) {

@@ -233,18 +233,12 @@ private:
       const auto found = std::find(items.begin(), items.end(), k);
       return int(found - items.begin()) + (found == items.end() ? k : 0);
     };
-    auto flatten = [](const PairMemory &m) {
-      return std::array<double, 10>{double(m.edge), double(m.to_rod), double(m.to_edge), double(m.point),
-                                    m.stick[0],     m.stick[1],       m.stick[2],        m.friction[0],
-                                    m.friction[1],  m.friction[2]};
-    };
-    auto unfold = [](const std::array<double, 10> &m) {
-      return PairMemory{int(m[0]), int(m[1]), int(m[2]), int(m[3]), {m[4], m[5], m[6]}, {m[7], m[8], m[9]}};
-    };
+    auto flatten = [](const PairMemory &m) { return m.numbers(); };
+    auto unfold = [](const std::array<double, PairMemory::width> &m) { return PairMemory::of(m.data()); };
     for (auto &of_rod : mine.pairs)
       for (PairMemory &m : of_rod)
         if (collects_) rename(m, whole);
-    moveRows<10>(mine.pairs, all ? &all->pairs : nullptr, rods, flatten, unfold);
+    moveRows<PairMemory::width>(mine.pairs, all ? &all->pairs : nullptr, rods, flatten, unfold);
     for (auto &of_rod : mine.pairs)
       for (PairMemory &m : of_rod)
         if (!collects_) rename(m, own);

@@ -279,10 +279,10 @@ static void readContact(YamlMap &map, const ContactSettings &of_scene, Body &bod
   read("bodies[].contact.fall_off_velocity", contact.fall_off_velocity);
   read("bodies[].contact.tangential_damping", contact.tangential_damping);
   read("bodies[].contact.normal_damping", contact.normal_damping);
-  if (const double size = std::sqrt(body.own.inertia.trace() / body.own.mass); contact.distance > size)
+  if (contact.distance > gyration)
     block.at("bodies[].contact.distance")
         .fail("the 'distance' of its contact, " + shortText(contact.distance) +
-              " m, must not exceed the body's radius of gyration, " + shortText(size) + " m");
+              " m, must not exceed the body's radius of gyration, " + shortText(gyration) + " m");
   block.finish();
 }
 

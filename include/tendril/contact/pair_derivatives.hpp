@@ -17,6 +17,12 @@ struct OfPair {
   static int vertex(int k) { return half * (k / 2) + 3 * (k % 2); }
 };
 
+/// Of one of both, a rod or a body.
+inline const ContactSettings &settingsOf(const Scene &scene, const TouchingPair &pair, int side) {
+  return pair.isBody(side) ? scene.bodies[std::size_t(pair.body(side))].contact
+                           : scene.rods[std::size_t(pair.rodOf(side))].contact;
+}
+
 /// A point that the frame of an edge or of a body carries.
 struct CarriedPoint {
   double at; ///< part of the edge
@@ -40,6 +46,7 @@ struct SlidingPair {
   int side, sample;        ///< which of the pair has it, and which of its samples
   CarriedPoint own, other; ///< of the sample's side; of the other
   SlidingPoint point;
+  const ContactSettings *both = nullptr; ///< between its sides (bothSlide)
   SlidingPoint &slid() { return point; }
   bool isSame(const SlidingPair &b) const {
     return pair.number == b.pair.number && side == b.side && sample == b.sample;

@@ -4,6 +4,7 @@
 
 #include "tendril/contact/pair_derivatives.hpp"
 
+#include <map>
 #include <utility>
 
 namespace tendril {
@@ -28,8 +29,8 @@ public:
   /// Force that presses on a sample, by its law there, or while points are held by the width of that.
   double pressing(const NormalLaw &law, double weight, double gap, const TouchingPair &pair) const {
     if (!holds(pair.rod)) return -weight * law(gap).slope;
-    const ContactSettings &one = settingsOf(pair, 0), &other = settingsOf(pair, 1);
-    return bothSlide(one, other).friction * weight * law.stiffness() * (one.isBarrier() ? 1 : law.reach());
+    return bothOf(pair).friction * weight * law.stiffness() *
+           (settingsOf(scene_, pair, 0).isBarrier() ? 1 : law.reach());
   }
   /// Enters what a point has from its pair and from the steps before.
   void complete(SlidingPair *p) const;
@@ -56,19 +57,17 @@ private:
   const Scene &scene_;
   bool of_rods_, slides_, static_ = false;
   std::vector<OfRod> of_;
+  mutable std::map<std::pair<int, int>, ContactSettings> both_; ///< by rods, or bodies as TouchingPair names them
   const Configuration *start_ = nullptr;
   double time_ = 0; ///< that the step takes; 0 in statics [s]
 
-  const ContactSettings &settingsOf(const TouchingPair &p, int side) const {
-    return p.isBody(side) ? scene_.bodies[std::size_t(p.body(side))].contact
-                          : scene_.rods[std::size_t(p.rodOf(side))].contact;
-  }
+  const ContactSettings &bothOf(const TouchingPair &p) const;
   bool isAnchored(const TouchingPair &p) const {
-    return settingsOf(p, 0).isAnchored(static_) && settingsOf(p, 1).isAnchored(static_);
+    return settingsOf(scene_, p, 0).isAnchored(static_) && settingsOf(scene_, p, 1).isAnchored(static_);
   }
-  Sliding slidingOf(const SlidingPair &p, const ContactSettings &both, bool holds) const {
+  Sliding slidingOf(const SlidingPair &p, bool holds) const {
     const bool by_length = static_ || isAnchored(p.pair);
-    return {by_length ? both.slip_length : both.fall_off_velocity * time_, time_, holds};
+    return {by_length ? p.both->slip_length : p.both->fall_off_velocity * time_, time_, holds};
   }
   SlidingForce forceOn(const SlidingPair &p, bool holds, const Configuration &c) const;
 };

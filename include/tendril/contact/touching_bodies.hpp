@@ -50,8 +50,7 @@ public:
 
   const NormalLaw &lawOf(const TouchingPair &p) const { return laws_[std::size_t(p.number)]; }
   const ContactSettings &settingsOf(const TouchingPair &p, int side) const {
-    return p.isBody(side) ? scene_.bodies[std::size_t(p.body(side))].contact
-                          : scene_.rods[std::size_t(p.rodOf(side))].contact;
+    return tendril::settingsOf(scene_, p, side);
   }
   Collider::Pose poseOf(int body, const Configuration &c) const;
   /// The point that a sample stands for.
@@ -125,11 +124,6 @@ private:
   void leaveOut();
   bool mayTouch(int rod, int edge, int body) const;
   bool mayTouch(int body, int other) const;
-  /// The rod and the body of a pair, or its bodies.
-  static std::pair<int, int> thingsOf(const TouchingPair &p) {
-    auto thing = [&](int side) { return p.isBody(side) ? TouchingPair::ofBody(p.body(side)) : p.rodOf(side); };
-    return {thing(0), thing(1)};
-  }
   void makeRoom(const Configuration &start, const Planes *way, double room) const;
   bool isInRoom(const Configuration &from, const Configuration &to, double part, int rod) const;
   void take() const;

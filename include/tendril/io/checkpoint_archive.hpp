@@ -145,16 +145,15 @@ template <class Archive, class AnyState, class Whole> void exchangeContacts(Arch
   }
 }
 
-/// Per rod a number of rows of 4 + 6 numbers (PairMemory).
+/// Per rod a number of rows (PairMemory).
 template <class Archive, class AnyState, class Whole> void exchangePairs(Archive &a, AnyState &s, Whole &whole) {
   std::size_t rods = s.pairs.size(), total = 0;
   std::vector<double> counts, rows;
-  constexpr std::size_t width = 10;
   for (const auto &of_rod : s.pairs) {
     counts.push_back(double(of_rod.size()));
     for (const PairMemory &m : of_rod) {
-      for (const int n : {m.edge, m.to_rod, m.to_edge, m.point}) rows.push_back(n);
-      for (const Vec3 *v : {&m.stick, &m.friction}) rows.insert(rows.end(), v->begin(), v->end());
+      const auto row = m.numbers();
+      rows.insert(rows.end(), row.begin(), row.end());
     }
   }
   total = rows.size();
@@ -164,10 +163,10 @@ template <class Archive, class AnyState, class Whole> void exchangePairs(Archive
   a.array("pair_memory", rows, total);
   if constexpr (Archive::reads) {
     s.pairs.assign(rods, {});
-    const double *x = rows.data(), *const end = x + rows.size();
+    std::size_t next = 0;
     for (std::size_t r = 0; r < rods; ++r)
-      for (double n = 0; n < counts[r] && x + width <= end; ++n, x += width)
-        s.pairs[r].push_back({int(x[0]), int(x[1]), int(x[2]), int(x[3]), {x[4], x[5], x[6]}, {x[7], x[8], x[9]}});
+      for (double n = 0; n < counts[r] && next + PairMemory::width <= rows.size(); ++n, next += PairMemory::width)
+        s.pairs[r].push_back(PairMemory::of(&rows[next]));
   }
 }
 

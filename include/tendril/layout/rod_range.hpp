@@ -150,6 +150,8 @@ struct TouchingPair {
   int body(int side) const { return -1 - (side == 0 ? edge : to_edge); }
   int rodOf(int side) const { return side == 0 ? rod : to_rod; }
   int edgeOf(int side) const { return side == 0 ? edge : to_edge; }
+  /// Both that touch: rods by their numbers, bodies by ofBody.
+  std::pair<int, int> things() const { return {edge < 0 ? edge : rod, to_edge < 0 ? to_edge : to_rod}; }
   bool isOfRods() const { return edge >= 0 && to_edge >= 0; }
   bool isOfBodies() const { return edge < 0 && to_edge < 0; }
   /// Of an edge x, y, z of its first vertex, those of its second, and its twist; of a body its displacement and spin.

@@ -206,7 +206,7 @@ struct Scene {
   bool touches(int rod) const { return !colliders.empty() && rods[rod].contact.on; }
   /// Whether friction or damping with obstacles acts on any rod.
   bool slides() const;
-  /// Whether any of a rod acts at all.
+  /// The same with obstacles, or among rods and bodies.
   bool hasFriction() const { return slides() || slidesAmongMoving(); }
 };
 

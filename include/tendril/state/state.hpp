@@ -49,6 +49,15 @@ struct PairMemory {
   Vec3 friction;             ///< on it, with the damping of the contact [N]
   bool operator==(const PairMemory &) const = default;
   auto key() const { return std::tuple(edge, to_rod, to_edge, point); }
+  /// As a row of numbers, and from one.
+  static constexpr std::size_t width = 10;
+  std::array<double, width> numbers() const {
+    return {double(edge), double(to_rod), double(to_edge), double(point), stick[0],
+            stick[1],     stick[2],       friction[0],     friction[1],   friction[2]};
+  }
+  static PairMemory of(const double *x) {
+    return {int(x[0]), int(x[1]), int(x[2]), int(x[3]), {x[4], x[5], x[6]}, {x[7], x[8], x[9]}};
+  }
 };
 
 /// What a joint remembers.
