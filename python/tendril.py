@@ -14,6 +14,7 @@ import re
 import time as clock
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import h5py
 import numpy as np
@@ -153,7 +154,8 @@ class Rod:
     half_axes (2,) [m] along the first and second director, nan without a section;
     radius [m]: mean of the half axes; without them that of a homogeneous round rod of this stiffness, 2 sqrt(EI/EA),
     or nan for cables;
-    material: its parameters by name, units by Trajectory.unit.
+    material: its parameters by name, units by Trajectory.unit;
+    skin: the Skin that is embedded in it, or None.
     """
 
     def __init__(self, trajectory, index):
@@ -192,6 +194,15 @@ class Rod:
             raise TendrilError(f"there is no reference '{name}'; there are: {_listed(names)}")
         return self._t._dataset("reference/" + name)[self._slices["edges" if name == "director" else "vertices"]]
 
+    @property
+    def skin(self):
+        """The Skin that is embedded in the rod; None without one."""
+        if "skins" not in self._t._file:
+            return None
+        rows = [slice(*self._t._dataset(f"skins/{kind}_offsets")[self.index : self.index + 2].tolist())
+                for kind in ("point", "triangle")]
+        return Skin(self, *rows) if rows[0].stop > rows[0].start else None
+
     def _slice(self, place):
         if place in ROWS:
             raise TendrilError(f"a field of {place} is not one of rods: trajectory.field(name)[frame] has a row for each "
@@ -202,6 +213,73 @@ class Rod:
 
     def __repr__(self):
         return f"<rod '{self.name}', {self.vertices} vertices>"
+
+
+def edge_frames(position, director):
+    """Middles [m], edges [m], unit tangents and second directors, each (..., edges, 3), of vertices (..., n, 3) [m] and
+    first directors (..., edges, 3); with as many edges as vertices the last one ends in the first vertex."""
+    before = position[..., : director.shape[-2], :]
+    after = np.roll(position, -1, -2)[..., : director.shape[-2], :]
+    tangent = _unit_vectors(after - before, 0.0)
+    return (before + after) / 2, after - before, tangent, np.cross(tangent, director)
+
+
+def surface_normals(points, triangles):
+    """Unit normals (..., n, 3) at points (..., n, 3), means of those of their triangles (m, 3) weighted by area; 0 where
+    there is none."""
+    corner, sums = points[..., triangles, :], np.zeros(points.shape)
+    across = np.cross(corner[..., 1, :] - corner[..., 0, :], corner[..., 2, :] - corner[..., 0, :])
+    for frame in np.ndindex(points.shape[:-2]):
+        for i in range(3):
+            sums[frame][:, i] = np.bincount(triangles.ravel(), np.repeat(across[frame][:, i], 3), points.shape[-2])
+    return _unit_vectors(sums, 0.0)
+
+
+class Skin:
+    """A surface of triangles that a rod carries with it. Frames are numbers (-1 is the last) or slices.
+
+    points: how many; triangles (m, 3): numbers of points, anticlockwise seen from outside;
+    edge, weight (points, K) and local (points, K, 3) [m]: a point is the sum over its K edges of the rod of weight times
+    middle + local[0]/L edge + local[1] director + local[2] second director; L is in `lengths` (edges,) [m], of the edges
+    as drawn.
+    """
+
+    def __init__(self, rod, points, triangles):
+        self._rod, self._points, self._triangles = rod, points, triangles
+        self.points = points.stop - points.start
+
+    triangles = cached_property(lambda self: self._rod._t._dataset("skins/triangles")[self._triangles])
+    edge = cached_property(lambda self: self._rod._t._dataset("skins/edge")[self._points])
+    weight = cached_property(lambda self: self._rod._t._dataset("skins/weight")[self._points])
+    local = cached_property(lambda self: self._rod._t._dataset("skins/local")[self._points])
+
+    @cached_property
+    def lengths(self):
+        x = self._rod.reference("position")
+        return np.linalg.norm(np.roll(x, -1, 0) - x, axis=1)[: self._rod.edges]
+
+    def vertices(self, frame=-1):
+        """The points (points, 3) [m]; with a slice of frames (frames, points, 3)."""
+        return self._placed(self._rod.position(frame), self._rod.director(frame))
+
+    def normals(self, frame=-1):
+        """Unit normals at the points, (points, 3) or (frames, points, 3): means of the triangles around, by area."""
+        return surface_normals(self.vertices(frame), self.triangles)
+
+    def reference(self):
+        """The points as drawn, (points, 3) [m]."""
+        return self._placed(self._rod.reference("position"), self._rod.reference("director"))
+
+    def _placed(self, position, director):
+        middle, edge, _, second = edge_frames(position, director)
+        along, parts = self.local.copy(), (edge, director, second)
+        along[..., 0] /= self.lengths[self.edge]
+        return sum(self.weight[:, k, None] * (middle[..., e, :] + sum(along[:, k, i, None] * parts[i][..., e, :]
+                                                                      for i in range(3)))
+                   for k, e in enumerate(self.edge.T))
+
+    def __repr__(self):
+        return f"<skin of rod '{self._rod.name}', {self.points} points, {len(self.triangles)} triangles>"
 
 
 class Rods(Sequence):
@@ -645,7 +723,7 @@ class Trajectory:
         """Unit of a dataset: a field, column of the diagnostics, parameter of the material; 1 of pure numbers.
         Of equal names a field goes first: `diagnostics/twist` is the energy [J]."""
         groups = ("", "state/", "diagnostics/", "material/", "rods/", "reference/", "critical/", "estimate/",
-                  "bodies/")
+                  "bodies/", "skins/")
         for path in (group + name for group in groups):
             if isinstance(self._file.get(path), h5py.Dataset):
                 if self.format_version > 1:

@@ -177,13 +177,29 @@ class Facets:
         p = v if view.perspective else np.concatenate([v[:, :, :2], np.ones_like(v[:, :, :1])], 2)
         self.weight = np.stack([np.cross(p[:, 1], p[:, 2]), np.cross(p[:, 2], p[:, 0]), np.cross(p[:, 0], p[:, 1])], 1)
 
-    def boxes(self, view):
+    def strips(self, view):
+        """The triangle, lower and upper corners (n, 2) of boxes a pixel high that hold it: of slender ones a box has
+        mostly pixels that they are not at."""
         p = view.screen(self.corner.reshape(-1, 3)).reshape(-1, 3, 2)
-        lower, upper = p.min(1), p.max(1)
-        if view.perspective:  # one that reaches behind the eye may be anywhere
-            behind = (self.corner[:, :, 2] <= 1e-6).any(1)
-            lower[behind], upper[behind] = 0, [view.width, view.height]
-        return lower, upper
+        behind = (self.corner[:, :, 2] <= 1e-6).any(1) & view.perspective  # of the eye; these may be anywhere
+        first = np.where(behind, 0, np.clip(np.floor(p[:, :, 1].min(1)), 0, view.height)).astype(int)
+        end = np.where(behind, view.height, np.clip(np.ceil(p[:, :, 1].max(1)), 0, view.height)).astype(int)
+        rows = np.maximum(end - first, 0)
+        i = np.repeat(np.arange(len(rows)), rows)
+        y = np.arange(len(i)) - np.repeat(np.cumsum(rows) - rows - first, rows)
+        left, right = np.full(len(i), np.inf), np.full(len(i), -np.inf)
+        for k in range(3):
+            a, b = p[i, k], p[i, (k + 1) % 3]
+            high = b[:, 1] - a[:, 1]
+            for row in (y, y + 1):  # where the side enters and leaves the row, or its ends within
+                s = np.clip((row - a[:, 1]) / np.where(high == 0, 1, high), 0, 1)  # ends of level ones are others's
+                x = a[:, 0] + s * (b[:, 0] - a[:, 0])
+                there = (np.minimum(a[:, 1], b[:, 1]) <= y + 1) & (np.maximum(a[:, 1], b[:, 1]) >= y)
+                left = np.minimum(left, np.where(there, x, np.inf))
+                right = np.maximum(right, np.where(there, x, -np.inf))
+        left, right = left - 1e-3, right + 1e-3  # rounding
+        left[behind[i]], right[behind[i]] = 0, view.width
+        return i, np.stack([left, y], 1), np.stack([right, y + 1], 1)
 
     def weights(self, i, X, Y):
         w = self.weight[i]
@@ -234,7 +250,9 @@ def cast(view, shapes, samples=1, line_width=1.2):
     buffer = np.full(view.width * view.height * count, NOTHING)
     for kind, first in ((tubes, 0), (facets, len(shapes.capsules))):
         near = kind.near(view) if kind is tubes else None
-        for i, px, py in pairs(*kind.boxes(view), view.width, view.height, near, PAIRS):
+        owner, *boxes = (None, *kind.boxes(view)) if kind is tubes else kind.strips(view)
+        for i, px, py in pairs(*boxes, view.width, view.height, near, PAIRS):
+            i = i if owner is None else owner[i]
             pixel = py * view.width + px
             start = noise(tubes.group[i], pixel) if kind is tubes else None
             for s, (sx, sy) in enumerate(places):

@@ -1,8 +1,9 @@
 """From a trajectory to shapes: which frames, which values, which colours."""
 import numpy as np
-from tendril import ON_DEMAND, Trajectory
+from tendril import ON_DEMAND, Trajectory, surface_normals
 
-from .shapes import RECTANGLE, bar, body, ellipse, join, smoothed, tube
+from .shapes import RECTANGLE, Shapes, Triangles, bar, body, ellipse, join, smoothed, tube
+from .skins import along, creased
 
 OF_OUR_OWN = ("time", "rod")  # values that every trajectory has
 
@@ -87,7 +88,7 @@ class Source:
     """Shapes of frames of a trajectory, coloured by a field."""
 
     def __init__(self, t, field, frames, theme, colours, radius=None, smooth=False, offset=(0, 0, 0),
-                 rods=slice(None)):
+                 rods=slice(None), skins=True):
         if field is not None and field not in fields(t):
             hint = f"; runs with -output_fields all,{field} have it" if field in ON_DEMAND else ""
             raise Mistake(f"field {field}: this trajectory has {', '.join(fields(t))}{hint}")
@@ -95,6 +96,9 @@ class Source:
         self.rods = range(len(t.rods))[rods]
         if not self.rods:
             raise Mistake(f"none of the {len(t.rods)} rods is chosen")
+        # Skins by rod: the skin, the points that are split where it is sharp, and the triangles of these.
+        self.skins = {k: (skin, *creased(skin.reference(), skin.triangles)) for k in self.rods if skins
+                      if (skin := getattr(t.rods[k], "skin", None)) is not None}
         self.offset = np.asarray(offset, float)  # from one frame of a picture to the next [m]
         self.left_out = 0  # edges that are not finite
         self.clipped = False  # whether there are values above the scale
@@ -132,26 +136,29 @@ class Source:
         return axes if np.isfinite(axes).all() else np.full(2, np.nan_to_num(rod.radius))
 
     def clouds(self, frames):
-        """Points (n, 3) along all rods [m], an array for each frame of a picture."""
-        def along(x, closed):
+        """Points (n, 3) along all rods and on their skins [m], an array for each frame of a picture."""
+        def between(x, closed):
             x = np.concatenate([x, x[:1]]) if closed else x
             s = np.arange(8)[:, None, None] / 8
             return np.concatenate([(x[:-1] + s * (x[1:] - x[:-1])).reshape(-1, 3), x[-1:]])
 
         rods = [self.t.rods[k] for k in self.rods]
-        return [np.concatenate([along(r.position(f), r.closed) for r in rods]) + j * self.offset
+        return [np.concatenate([between(r.position(f), r.closed) for r in rods]
+                               + [skin.vertices(f) for skin, _, _ in self.skins.values()]) + j * self.offset
                 for j, f in enumerate(frames)]
 
     def rod(self, index, frame, place, pixel):
-        """Shapes of one rod in the frame at a place of the list; what is wide in pixels is swept."""
+        """Shapes of one rod in the frame at a place of the list: its skin, or its section, swept if wide in pixels."""
         rod = self.t.rods[index]
         x, d, axes = rod.position(frame) + place * self.offset, rod.director(frame), self.half_axes(rod)
+        bad = ~np.isfinite(x).all(1)
+        self.left_out += int((bad | np.roll(bad, -1))[: len(d)].sum())
+        if index in self.skins:
+            return self.skin(index, frame, place)
         if self.colours is None:
             colour = np.tile(np.asarray(self.theme.plain) ** 2.2, (len(x), 1))
         else:
             colour = self.colours.of(np.nan_to_num(value(self.t, self.field, index, frame)))
-        bad = ~np.isfinite(x).all(1)
-        self.left_out += int((bad | np.roll(bad, -1))[: len(d)].sum())
         if self.smooth:
             x, d, colour = smoothed(x, d, colour, rod.closed)
         wide = axes.max() > max(pixel, 1.02 * axes.min()) and len(d)
@@ -159,6 +166,19 @@ class Source:
             outline = RECTANGLE if rod.section == "rectangle" else ellipse()
             return bar(x, d, axes, colour, rod.closed, outline)
         return tube(x, d, axes, colour, rod.closed, place * len(self.t.rods) + index)
+
+    def skin(self, index, frame, place):
+        """Shapes of the skin of a rod; triangles that are not finite are left out."""
+        skin, point, triangles = self.skins[index]
+        x = skin.vertices(frame)[point] + place * self.offset
+        if self.colours is None:
+            colour = np.tile(np.asarray(self.theme.plain) ** 2.2, (len(x), 1))
+        else:
+            values = along(skin, np.nan_to_num(value(self.t, self.field, index, frame)))
+            colour = self.colours.of(values)[point]
+        normal = surface_normals(x, triangles)
+        triangles = triangles[np.isfinite(x[triangles]).all((1, 2))]
+        return Shapes(triangles=Triangles(x[triangles], normal[triangles], colour[triangles]))
 
     def shapes(self, frames, pixel=0):
         """All that is seen in some frames at once; `pixel`: the size of one [m]."""
@@ -177,10 +197,11 @@ class Source:
     def points(self, frame, place=0):
         """Centres (n, 3) and radii (n,) [m] of balls that hold the rods and bodies; colliders may be endless."""
         parts = [self.thing(b, frame, (0, 0, 0), place).points() for b in self.t.bodies]
-        for rod in (self.t.rods[k] for k in self.rods):
-            x = rod.position(frame) + place * self.offset
+        for k in self.rods:
+            rod, skinned = self.t.rods[k], k in self.skins
+            x = (self.skins[k][0].vertices(frame) if skinned else rod.position(frame)) + place * self.offset
             x = x[np.isfinite(x).all(1)]
-            parts.append((x, np.full(len(x), self.half_axes(rod).max())))
+            parts.append((x, np.full(len(x), 0 if skinned else self.half_axes(rod).max())))
         return tuple(np.concatenate(v) for v in zip(*parts))
 
     def bounds(self, frames, places=None):

@@ -176,7 +176,7 @@ public:
       });
       for (const Slid &p : sliding_[std::size_t(b.body)].points) {
         const SlidingForce force = forceOn(p, contacts, b, c);
-        addAt(c.rotationAt(b.rotation) * p.point.arm, force.gradient, force.hessian, gradient, hessian);
+        addAt(c.rotationAt(b.rotation) * p.arm, force.gradient, force.hessian, gradient, hessian);
       }
       for (int a = 0; a < 3; ++a) {
         out.equilibrium[a][b.position] += gradient[a];
@@ -238,6 +238,7 @@ private:
   struct Slid {
     int sample;
     SlidingPoint point;
+    Vec3 arm = Vec3::Zero();
     SlidingPoint &slid() { return point; }
     bool isSame(const Slid &b) const { return sample == b.sample && point.collider == b.point.collider; }
   };
@@ -283,7 +284,7 @@ private:
     return slidingForce(p.point, contacts.settings(), sliding_[std::size_t(b.body)].sliding, wayOf(p, contacts, b, c));
   }
   static Vec3 wayOf(const Slid &p, const BodyContacts &contacts, const JoinedBody &b, const Configuration &c) {
-    return c.positionAt(b.position) + c.rotationAt(b.rotation) * p.point.arm -
+    return c.positionAt(b.position) + c.rotationAt(b.rotation) * p.arm -
            contacts.pose(p.point.collider, c).fromLocal(p.point.touched) - p.point.start;
   }
   std::vector<Slid> slidingPoints(const BodyContacts &contacts, const JoinedBody &b, const Configuration &c) const {
@@ -302,7 +303,7 @@ private:
       p.point.coefficient = collider.friction < 0 ? own : std::sqrt(own * collider.friction);
       p.point.normal = -push / pressing;
       const double radius = contacts.sample(n.sample).radius;
-      p.point.arm = contacts.sample(n.sample).arm - radius * (c.rotationAt(b.rotation).transpose() * p.point.normal);
+      p.arm = contacts.sample(n.sample).arm - radius * (c.rotationAt(b.rotation).transpose() * p.point.normal);
       p.point.touched = n.local - radius * (pose.rotation.transpose() * p.point.normal);
       p.point.start = Vec3::Zero();
       p.point.start = wayOf(p, contacts, b, start);

@@ -97,9 +97,12 @@ public:
     rod.visitTouching(c, rod.law(), [&](const Samples &samples, int k) {
       const ContactPoint point = contactPoint(scene_, rod, samples, k);
       const Mat3 h = kind == HessianKind::gauss_newton ? point.stiffness : Mat3(point.stiffness + point.curvature);
-      addOnAxis(point.at, samples.slot[k], -point.force, h, wanted, out);
+      addAt(point.rod, -point.force, h, kind != HessianKind::gauss_newton, c, wanted, out);
     });
-    for (const SlidingPoint &point : sliding_[r].points) addSliding(point, forceOn(point, c, r), c, wanted, out);
+    for (const SlidingPoint &point : sliding_[r].points) {
+      const SlidingForce force = forceOn(point, c, r);
+      addAt(point.rod, force.gradient, force.hessian, true, c, wanted, out);
+    }
   }
   std::array<double, 2> pressure(const Configuration &c, const Planes &increment, int r) const override {
     std::array<double, 2> sum{0, 0};
@@ -107,9 +110,8 @@ public:
     const RodContacts &rod = *of_[r];
     rod.visitTouching(c, rod.law(), [&](const Samples &samples, int k) {
       const ContactPoint point = contactPoint(scene_, rod, samples, k);
-      const Vec3 from = increment.vector(0, samples.slot[k]), to = increment.vector(0, samples.slot[k] + 1);
       sum[0] += point.force.norm();
-      sum[1] += (point.stiffness * ((1 - point.at) * from + point.at * to)).norm();
+      sum[1] += (point.stiffness * motionOf(point.rod, c, increment)).norm();
     });
     return sum;
   }
@@ -121,7 +123,7 @@ public:
       if (!collider.motion.moves()) return;
       const ContactPoint point = contactPoint(scene_, rod, samples, k);
       const Vec3 moved = collider.poseAt(time).fromLocal(samples.at(k)) - samples.pose.fromLocal(samples.at(k));
-      spread(point.at, samples.slot[k], -(point.stiffness + point.curvature) * moved, out);
+      spread(point.rod, -(point.stiffness + point.curvature) * moved, c, out);
     });
   }
   std::array<Vec3, 2> actionOfObstacle(int collider, const Configuration &c, int r) const override {
@@ -277,7 +279,7 @@ private:
     const OfSliding &sliding = sliding_[r];
     const Collider::Pose pose = scene_.colliders[point.collider].poseAt(c.obstacleTime(r));
     const Vec3 way = wayOf(point, c, pose);
-    ContactMemory memory{point.slot - elements_.rods[r].first_slot, point.point, point.collider, Vec3::Zero(),
+    ContactMemory memory{point.rod.slot() - elements_.rods[r].first_slot, point.point, point.collider, Vec3::Zero(),
                          -slidingForce(point, scene_.rods[r].contact, sliding.sliding, way).gradient};
     if (!sliding.anchored) return memory;
     const Vec3 drawn = way - point.normal.dot(way) * point.normal + point.stick;
@@ -289,7 +291,7 @@ private:
   void recall(SlidingPoint *point, const Mat3 &rotation, int r) const {
     const OfSliding &sliding = sliding_[r];
     const ContactMemory *found =
-        find(sliding.before, point->slot - elements_.rods[r].first_slot, point->collider, point->point);
+        find(sliding.before, point->rod.slot() - elements_.rods[r].first_slot, point->collider, point->point);
     if (!found) return;
     point->held = found->friction;
     if (!sliding.anchored) return;
@@ -312,18 +314,17 @@ private:
       const Vec3 normal = contact.normal / steep;
       const Collider &collider = scene_.colliders[samples.collider];
       SlidingPoint point{};
-      point.slot = samples.slot[k];
+      point.rod = contact.rod;
       point.point = samples.point[k];
       point.collider = samples.collider;
-      point.at = contact.at;
       point.pressing = -contacts.weight(samples, k) * slope * steep;
       point.coefficient =
           collider.friction < 0 ? rod.contact.friction : std::sqrt(rod.contact.friction * collider.friction);
       point.normal = normal;
       point.touched = samples.at(k);
-      if (carriesSurface(rod)) {
+      if (carriesSurface(rod) && !rod.contact.on_surface) {
         point.touched -= rod.contact.radius * (samples.pose.rotation.transpose() * normal);
-        point.arm = -rod.contact.radius * (matrixOf(c.frameAt(point.slot)).transpose() * normal);
+        point.rod.by[0].point.arm = -rod.contact.radius * (matrixOf(c.frameAt(samples.slot[k])).transpose() * normal);
       }
       recall(&point, samples.pose.rotation, r);
       if (holds) // as if it were pressed by the width of its law

@@ -1,5 +1,7 @@
 #include "tendril/contact/obstacles.hpp"
 
+#include "tendril/embedding/embedding.hpp"
+
 #include <algorithm>
 
 namespace tendril {
@@ -53,10 +55,41 @@ RodContacts::RodContacts(const Scene &scene, const Elements &elements, int rod)
     points_.push_back(samplePoints(settings_.quadrature, longest, sampleSpacing(*collider.shape, settings_)));
   for (const Collider &collider : scene.colliders) walls_.push_back(settings_.wall(*collider.shape));
   for (AlignedVector &x : seen_) x.assign(seenOf(chunks()) + lanes, 0.0);
+  if (settings_.on_surface) takeSkin(scene.rods[rod]);
+}
+
+void RodContacts::takeSkin(const Rod &rod) {
+  const Skin skin = skinOf(rod);
+  const double around = measureOf(rod, skin).area / elements_.length(index_);
+  first_of_chunk_.assign(chunks() + 1, 0);
+  int number = 0;
+  for (const SkinSample &s : skinSamples(rod, skin, settings_.quadrature, std::min(rod.skin->edges, 2))) {
+    OnSkin sample;
+    sample.point.edges = s.point.edges;
+    sample.weight = s.area / around;
+    const int first = s.point.edge[0];
+    number = !skin_.empty() && skin_.back().point.slot() == rod_.slot(first) ? number + 1 : 0;
+    sample.number = number;
+    double gain = 0;
+    for (int k = 0; k < s.point.edges; ++k) {
+      const Vec3 &local = s.point.local[k];
+      const int slot = rod_.slot(s.point.edge[k]);
+      const double at = 0.5 + local[0] / rod.edge(s.point.edge[k]).norm(),
+                   apart = s.point.edges == 2 ? std::abs(at - 1 + k) : std::min(std::abs(at), std::abs(1 - at));
+      sample.point.by[k] = {slot, s.point.weight[k], {at, {0, local[1], local[2]}}};
+      arm_ = std::max(arm_, std::hypot(local[1], local[2]));
+      apart_ = std::max(apart_, apart);
+      gain += s.point.weight[k] * (std::abs(1 - at) + std::abs(at));
+    }
+    gain_ = std::max(gain_, gain);
+    skin_.push_back(sample);
+    ++first_of_chunk_[first / chunk_edges + 1];
+  }
+  for (int k = 0; k < chunks(); ++k) first_of_chunk_[k + 1] += first_of_chunk_[k];
 }
 
 double RodContacts::movedSince(const Configuration &c, int chunk) const {
-  const int slot = rod_.slot(chunk * chunk_edges), count = edgesOf(chunk) + 1;
+  const int slot = rod_.slot(chunk * chunk_edges), count = verticesOf(chunk);
   Pack most(0.0);
   for (int i = 0; i < count; i += lanes) {
     Pack sum(0.0);
@@ -67,7 +100,7 @@ double RodContacts::movedSince(const Configuration &c, int chunk) const {
     }
     most = max(most, count - i < lanes ? select(firstLanes(count - i), sum, Pack(0.0)) : sum);
   }
-  return std::sqrt(hmax(most));
+  return gain_ * std::sqrt(hmax(most));
 }
 
 void RodContacts::look(const Configuration &c, bool all) {
@@ -77,7 +110,7 @@ void RodContacts::look(const Configuration &c, bool all) {
   seen_time_ = time;
   for (int chunk = 0; chunk < chunks(); ++chunk) {
     if (!all && movedSince(c, chunk) <= 0.5 * nearest_[chunk]) continue;
-    const int slot = rod_.slot(chunk * chunk_edges), seen = seenOf(chunk), count = edgesOf(chunk) + 1;
+    const int slot = rod_.slot(chunk * chunk_edges), seen = seenOf(chunk), count = verticesOf(chunk);
     double longest = 0;
     for (int i = 0; i < count; ++i) {
       const Vec3 x = c.positionAt(slot + i);
@@ -87,8 +120,8 @@ void RodContacts::look(const Configuration &c, bool all) {
     nearest_[chunk] = HUGE_VAL;
     for (const int k : met_) {
       const Collider::Pose pose = scene_.colliders[k].poseAt(time);
-      std::array<std::array<double, chunk_edges + 1>, 3> local;
-      std::array<double, chunk_edges + 1> distance;
+      std::array<std::array<double, chunk_edges + 2>, 3> local;
+      std::array<double, chunk_edges + 2> distance;
       for (int i = 0; i < count; ++i) {
         const Vec3 x = pose.toLocal(Vec3(seen_[0][seen + i], seen_[1][seen + i], seen_[2][seen + i]));
         for (int a = 0; a < 3; ++a) local[a][i] = x[a];
@@ -96,31 +129,44 @@ void RodContacts::look(const Configuration &c, bool all) {
       const double *const points[3] = {local[0].data(), local[1].data(), local[2].data()};
       scene_.colliders[k].shape->distances(points, count, distance.data());
       const double least = *std::min_element(distance.begin(), distance.begin() + count);
-      away_[chunk * colliders + k] = least - settings_.radius - law_.reach() - 0.5 * longest;
+      away_[chunk * colliders + k] = least - settings_.padding() - law_.reach() - apart_ * longest - arm_;
       nearest_[chunk] = std::min(nearest_[chunk], away_[chunk * colliders + k]);
     }
   }
 }
 
+void RodContacts::placeSamples(const Configuration &c, Samples &out) const {
+  const std::vector<SamplePoint> &points = points_[out.collider];
+  const int begin = out.chunk * chunk_edges, n = int(points.size());
+  for (int k = 0; k < out.count; ++k) {
+    Vec3 x;
+    if (skin_.empty()) {
+      out.slot[k] = rod_.slot(begin + (out.first + k) / n);
+      out.point[k] = (out.first + k) % n;
+      const Vec3 from = c.positionAt(out.slot[k]);
+      x = from + points[out.point[k]].at * (c.positionAt(out.slot[k] + 1) - from);
+    } else {
+      const OnSkin &sample = onSkin(out, k);
+      out.slot[k] = sample.point.slot();
+      out.point[k] = sample.number;
+      x = placeOf(sample.point, c);
+    }
+    const Vec3 local = out.pose.toLocal(x);
+    for (int a = 0; a < 3; ++a) out.local[a][k] = local[a];
+  }
+}
+
 Samples RodContacts::samplesOf(const Configuration &c, int chunk, int collider, int first) const {
-  const std::vector<SamplePoint> &points = points_[collider];
-  const int begin = chunk * chunk_edges, edges = edgesOf(chunk), n = int(points.size());
   Samples out;
   out.collider = collider;
   out.chunk = chunk;
   out.first = first;
   out.pose = scene_.colliders[collider].poseAt(c.obstacleTime(index_));
-  out.count = std::min(Samples::most, edges * n - first);
-  for (int k = 0; k < out.count; ++k) {
-    out.slot[k] = rod_.slot(begin + (first + k) / n);
-    out.point[k] = (first + k) % n;
-    const Vec3 from = c.positionAt(out.slot[k]);
-    const Vec3 x = out.pose.toLocal(from + points[out.point[k]].at * (c.positionAt(out.slot[k] + 1) - from));
-    for (int a = 0; a < 3; ++a) out.local[a][k] = x[a];
-  }
+  out.count = std::min(Samples::most, samplesIn(chunk, collider) - first);
+  placeSamples(c, out);
   const double *const local[3] = {out.local[0].data(), out.local[1].data(), out.local[2].data()};
   scene_.colliders[collider].shape->distances(local, out.count, out.distance.data());
-  for (int k = 0; k < out.count; ++k) out.distance[k] -= settings_.radius;
+  for (int k = 0; k < out.count; ++k) out.distance[k] -= settings_.padding();
   return out;
 }
 
@@ -130,10 +176,9 @@ double RodContacts::smallestGap(const Configuration &c) const {
   double least = HUGE_VAL;
   for (int chunk = 0; chunk < chunks(); ++chunk) {
     const double moved = movedSince(c, chunk);
-    const int edges = edgesOf(chunk);
     for (const int k : met_) {
       if (stood && away_[chunk * colliders + k] - moved + law_.reach() >= least) continue;
-      for (int first = 0; first < edges * int(points_[k].size()); first += Samples::most) {
+      for (int first = 0; first < samplesIn(chunk, k); first += Samples::most) {
         const Samples samples = samplesOf(c, chunk, k, first);
         least = std::min(least, *std::min_element(samples.distance.begin(), samples.distance.begin() + samples.count));
       }
@@ -188,7 +233,7 @@ double RodContacts::freeFraction(const Configuration &from, const Configuration 
       shape.distances(points, going, distance.data());
       count = 0;
       for (int k = 0; k < going; ++k) {
-        ways[k].gap = distance[k] - settings_.radius - wall;
+        ways[k].gap = distance[k] - settings_.padding() - wall;
         if (ways[k].gap <= ways[k].stop)
           free = std::min(free, ways[k].done);
         else if (approaches(&ways[k]))

@@ -8,7 +8,9 @@
 namespace tendril {
 
 bool carriesSurface(const Rod &rod) {
-  return rod.contact.on && rod.contact.slides() && rod.contact.friction_at_surface && !rod.material.isCable();
+  const ContactSettings &contact = rod.contact;
+  return contact.on && !rod.material.isCable() &&
+         (contact.on_surface || (contact.slides() && contact.friction_at_surface));
 }
 
 double barrierStiffness(const Scene &scene, const Elements &elements, double force, double pressure, bool is_static,
@@ -33,7 +35,7 @@ ContactPoint contactPoint(const Scene &scene, const RodContacts &rod, const Samp
   const double weight = rod.weight(samples, k);
   const Mat3 &q = samples.pose.rotation;
   ContactPoint point;
-  point.at = rod.points(samples.collider)[samples.point[k]].at;
+  point.rod = rod.pointOf(samples, k);
   point.normal = q * d.gradient;
   point.force = -weight * law.slope * point.normal;
   point.stiffness = weight * law.curvature * point.normal * point.normal.transpose();
@@ -53,11 +55,10 @@ std::vector<ContactReading> contactReadings(const Scene &scene, const Elements &
     rod.visitTouching(c, rod.law(), [&](const Samples &samples, int k) {
       const ContactPoint point = contactPoint(scene, rod, samples, k);
       const int slot = samples.slot[k], edge = slot - elements.rods[r].first_slot;
-      const Vec3 from = c.positionAt(slot), place = from + point.at * (c.positionAt(slot + 1) - from);
       const ContactMemory *found = memory ? find(*memory, edge, samples.collider, samples.point[k]) : nullptr;
       const Vec3 friction = found ? found->friction : Vec3(Vec3::Zero());
-      readings.push_back({r, samples.collider, edge, point.at, samples.distance[k], place, point.normal.normalized(),
-                          point.force, friction});
+      readings.push_back({r, samples.collider, edge, point.rod, samples.distance[k], placeOf(point.rod, c),
+                          point.normal.normalized(), point.force, friction});
     });
   }
   return readings;
@@ -68,8 +69,12 @@ std::vector<Vec3> contactForces(const Elements &elements, const std::vector<Cont
   for (const ContactReading &reading : readings) {
     const RodRange &rod = elements.rods[reading.rod];
     const Vec3 both = reading.force + reading.friction;
-    force[rod.first_vertex + reading.edge] += (1 - reading.at) * both;
-    force[rod.first_vertex + (reading.edge + 1) % rod.vertices] += reading.at * both;
+    for (int k = 0; k < reading.point.edges; ++k) {
+      const auto &[slot, weight, carried] = reading.point.by[k];
+      const int edge = slot - rod.first_slot;
+      force[rod.first_vertex + edge % rod.vertices] += weight * (1 - carried.at) * both;
+      force[rod.first_vertex + (edge + 1) % rod.vertices] += weight * carried.at * both;
+    }
   }
   return force;
 }
@@ -81,7 +86,7 @@ void colliderActions(const Scene &scene, const std::vector<ContactReading> &read
   for (const ContactReading &c : readings) {
     const Rod &rod = scene.rods[c.rod];
     const Vec3 from = c.place - scene.colliders[c.collider].poseAt(time).position,
-               at = carriesSurface(rod) ? Vec3(from - rod.contact.radius * c.normal) : from;
+               at = carriesSurface(rod) ? Vec3(from - rod.contact.padding() * c.normal) : from;
     (*force)[c.collider] += c.force + c.friction;
     (*moment)[c.collider] += from.cross(c.force) + at.cross(c.friction);
   }
@@ -123,7 +128,7 @@ std::vector<Touch> tightest(const Scene &scene, const Elements &elements, const 
       for (int k = 0; k < samples.count; ++k) {
         Touch &worst = of_rod[samples.collider];
         if (samples.distance[k] >= worst.gap) continue;
-        const double at = rod.points(samples.collider)[samples.point[k]].at;
+        const double at = rod.pointOf(samples, k).by[0].point.at;
         double arc = 0;
         for (int s = elements.rods[r].first_slot; s < samples.slot[k]; ++s) arc += elements.restLength()[s];
         worst = {r, samples.collider, samples.distance[k], arc + at * elements.restLength()[samples.slot[k]]};

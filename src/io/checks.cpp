@@ -209,13 +209,14 @@ void refuseOverlaps(const Simulation &run) {
     const ContactSettings &contact = scene.rods[o.rod].contact;
     const double wall = contact.wall(*scene.colliders[o.collider].shape);
     if (o.gap > wall) continue;
-    throw SceneError("rod '" + scene.rods[o.rod].name + "' lies " + shortText(-o.gap) + " m deep in collider '" +
-                     scene.colliders[o.collider].name + "' at its start, at arc length " + shortText(o.arc) +
-                     " m; move one of them by " + shortText(wall - o.gap + 0.5 * contact.distance) + " m or more" +
-                     (-o.gap < contact.radius ? ", give the rod a smaller 'contact: {radius: ...}' than " +
-                                                    shortText(contact.radius) + " m,"
-                                              : std::string()) +
-                     " or write 'contact: none'");
+    throw SceneError(
+        "rod '" + scene.rods[o.rod].name + "' lies " + shortText(-o.gap) + " m deep in collider '" +
+        scene.colliders[o.collider].name + "' at its start, at arc length " + shortText(o.arc) +
+        " m; move one of them by " + shortText(wall - o.gap + 0.5 * contact.distance) + " m or more" +
+        (-o.gap < contact.radius && !contact.on_surface
+             ? ", give the rod a smaller 'contact: {radius: ...}' than " + shortText(contact.radius) + " m,"
+             : std::string()) +
+        " or write 'contact: none'");
   }
 }
 
@@ -247,12 +248,12 @@ std::vector<std::string> notesOnContact(const Simulation &run) {
           shortText(contact.distance) + " m wants " + shortText(wanted) +
           " m: other rods may stop between them; take shorter edges or a larger 'contact: {distance: ...}'");
     if (contact.quadrature == 0) continue;
-    const double apart = edge / contact.quadrature;
+    const double apart = edge / (contact.on_surface ? 2 : contact.quadrature);
     for (const Collider &c : run.scene.colliders)
-      if (const double across = 2 * (c.shape->depth() + contact.radius); apart > across)
+      if (const double across = 2 * (c.shape->depth() + contact.padding()); apart > across)
         notes.push_back("warning: rod '" + run.scene.rods[r].name + "' touches by points up to " + shortText(apart) +
                         " m apart and may miss collider '" + c.name + "', with it " + shortText(across) +
-                        " m across: take 'quadrature: auto' or shorter edges");
+                        " m across: take " + (contact.on_surface ? "" : "'quadrature: auto' or ") + "shorter edges");
   }
   return notes;
 }

@@ -1,5 +1,7 @@
 #include "tendril/io/collider_reader.hpp"
 
+#include "tendril/embedding/embedding.hpp"
+
 #include "tendril/io/mesh_reader.hpp"
 #include "tendril/io/support_reader.hpp"
 #include "tendril/io/text.hpp"
@@ -82,6 +84,7 @@ constexpr ShapeKey shape_keys[] = {
      }}};
 
 struct ContactKeys {
+  KeyOf<KeyType::word, KeyType::word_or_map> on;
   KeyOf<KeyType::flag> bodies;
   KeyOf<KeyType::word, KeyType::word_or_map> collider, cloud;
   KeyOf<KeyType::number> exclusion_ratio;
@@ -91,11 +94,11 @@ struct ContactKeys {
 };
 // clang-format off
 constexpr ContactKeys of_scene{
-    "contact.bodies", "contact.collider", "contact.cloud", "contact.exclusion_ratio", "contact.rods", "contact.law", "contact.friction_at", "contact.quadrature", "contact.stick", "contact.radius",
+    "contact.on", "contact.bodies", "contact.collider", "contact.cloud", "contact.exclusion_ratio", "contact.rods", "contact.law", "contact.friction_at", "contact.quadrature", "contact.stick", "contact.radius",
     "contact.distance", "contact.stiffness", "contact.threshold", "contact.smoothing", "contact.friction",
     "contact.fall_off_velocity", "contact.slip_length", "contact.tangential_damping", "contact.normal_damping"};
 constexpr ContactKeys of_rod{
-    "rods[].contact.bodies", "rods[].contact.collider", "rods[].contact.cloud", "rods[].contact.exclusion_ratio", "rods[].contact.rods", "rods[].contact.law", "rods[].contact.friction_at", "rods[].contact.quadrature", "rods[].contact.stick",
+    "rods[].contact.on", "rods[].contact.bodies", "rods[].contact.collider", "rods[].contact.cloud", "rods[].contact.exclusion_ratio", "rods[].contact.rods", "rods[].contact.law", "rods[].contact.friction_at", "rods[].contact.quadrature", "rods[].contact.stick",
     "rods[].contact.radius", "rods[].contact.distance", "rods[].contact.stiffness", "rods[].contact.threshold",
     "rods[].contact.smoothing", "rods[].contact.friction", "rods[].contact.fall_off_velocity", "rods[].contact.slip_length",
     "rods[].contact.tangential_damping", "rods[].contact.normal_damping"};
@@ -105,6 +108,7 @@ void readSettings(YamlMap &map, const ContactKeys &keys, ContactSettings &out) {
   auto read = [&](KeyOf<KeyType::number> key, double &value) {
     if (map.has(*key)) value = map.number(key);
   };
+  if (map.has(*keys.on)) out.on_surface = map.word(keys.on) == "surface";
   if (map.has(*keys.rods)) {
     using Rods = ContactSettings::Rods;
     const std::string which = map.word(keys.rods);
@@ -153,6 +157,32 @@ void readSettings(YamlMap &map, const ContactKeys &keys, ContactSettings &out) {
   if (out.isBarrier()) refuse(keys.threshold, "penalty");
   if (out.isBarrier()) refuse(keys.smoothing, "penalty");
   map.finish();
+}
+
+/// What a rod needs that touches by its skin; its penalty is per area as written.
+void completeSurface(const YamlValue &block, Rod &rod) {
+  ContactSettings &contact = rod.contact;
+  const std::string who = "rod '" + rod.name + "' touches by its surface";
+  if (!rod.skin) block.fail(who + ", and has none; give it one, as 'skin: {tube: {sides: 12}}'");
+  if (rod.material.isCable())
+    block.fail(who + ", and is a cable, which has no frames that carry one; take 'on: surface' away");
+  if (rod.skin->mesh && rod.skin->edges > 2)
+    block.fail(who + ", whose points no more than two edges may carry; take 'edges: 2' for its mesh");
+  if (contact.touchesMoving())
+    block.fail(who + ", which meets obstacles so far; take 'rods' and 'bodies' out of its contact, or 'on: surface'");
+  if (contact.quadrature == 0) contact.quadrature = 3;
+  if (contact.quadrature == 2) block.fail(who + ", which has 1, 3 or 6 points of a triangle for 'quadrature', not 2");
+  if (!contact.friction_at_surface) block.fail(who + ", and 'friction_at: centreline' is for 'on: axis'");
+  const Skin skin = skinOf(rod);
+  try {
+    checkClosed(rod, skin);
+  } catch (const std::invalid_argument &e) {
+    block.fail(who + ": " + e.what());
+  }
+  const double around = measureOf(rod, skin).area / rod.length(); // mean of its perimeter
+  if (!contact.isBarrier() && contact.stiffness == 0) contact.stiffness = 1e9;
+  contact.stiffness *= around;
+  contact.radius = around / (2 * pi);
 }
 
 } // namespace
@@ -255,6 +285,7 @@ void completeContact(const YamlValue &block, const Overrides &overrides, Scene &
     replace("contact_distance", contact.distance);
     if (!contact.isBarrier() && overrides.count("contact_distance"))
       throw SceneError("option -contact_distance: is for 'law: barrier', which rod '" + rod.name + "' has not");
+    if (contact.on_surface) completeSurface(block, rod);
     if (std::isnan(contact.radius)) {
       if (!rod.material.section)
         block.fail("rod '" + rod.name +
@@ -272,6 +303,8 @@ void completeContact(const YamlValue &block, const Overrides &overrides, Scene &
       block.fail("rod '" + rod.name + "': the 'distance' of its contact, " + shortText(contact.distance) +
                  " m, must not exceed its radius, " + shortText(contact.radius) + " m");
     if (!contact.isBarrier() && contact.stiffness == 0) contact.stiffness = 1e9;
+    if (!contact.on_surface && contact.quadrature == 6)
+      block.fail("rod '" + rod.name + "' has 6 points of a triangle for 'quadrature', which is for 'on: surface'");
     if (contact.touchesRods() && !one) one = &rod;
     if (contact.touchesRods() && one->contact.law != contact.law)
       block.fail("rods '" + one->name + "' and '" + rod.name +

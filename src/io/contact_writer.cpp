@@ -9,7 +9,7 @@ constexpr ContactWriter::Column of_obstacles[] = {
     {"rod", "1", 1, true, [](const ContactReading &c, double *out) { *out = c.rod; }},
     {"collider", "1", 1, true, [](const ContactReading &c, double *out) { *out = c.collider; }},
     {"edge", "1", 1, true, [](const ContactReading &c, double *out) { *out = c.edge; }},
-    {"at", "1", 1, false, [](const ContactReading &c, double *out) { *out = c.at; }},
+    {"at", "1", 1, false, [](const ContactReading &c, double *out) { *out = c.point.by[0].point.at; }},
     {"gap", "m", 1, false, [](const ContactReading &c, double *out) { *out = c.gap; }},
     {"position", "m", 3, false, [](const ContactReading &c, double *out) { putVector(c.place, out); }},
     {"normal", "1", 3, false, [](const ContactReading &c, double *out) { putVector(c.normal, out); }},

@@ -98,29 +98,50 @@ void Hdf5File::startAppending() {
 bool Hdf5File::has(const std::string &name) const { return H5Lexists(file_, name.c_str(), H5P_DEFAULT) > 0; }
 
 std::vector<double> Hdf5File::read(const std::string &name, hsize_t columns, std::optional<hsize_t> rows) const {
-  if (!has(name)) throw SceneError(path_ + ": has no dataset '" + name + "'");
-  const Hdf5Dataset data =
-      checked(H5Dopen2(file_, name.c_str(), H5P_DEFAULT), path_ + ": '" + name + "' is not a dataset");
-  const Hdf5Space space = H5Dget_space(data);
-  const int rank = H5Sget_simple_extent_ndims(space);
-  std::vector<hsize_t> shape(std::max(rank, 1), 1);
-  if (rank > 0) H5Sget_simple_extent_dims(space, shape.data(), nullptr);
-  const bool fits = columns == 1 ? rank == 1 : rank == 2 && shape.back() == columns;
+  const Hdf5Dataset data = datasetAt(name);
+  const std::vector<hsize_t> shape = shapeOf(data);
+  const bool fits = columns == 1 ? shape.size() == 1 : shape.size() == 2 && shape.back() == columns;
   if (!fits)
     throw SceneError(path_ + ": dataset '" + name + "' must have " +
                      (columns == 1 ? "one dimension" : "shape (n, " + std::to_string(columns) + ")"));
   if (rows && shape[0] != *rows)
     throw SceneError(path_ + ": '" + name + "' has " + std::to_string(shape[0]) + " entries, where it takes " +
                      std::to_string(*rows));
+  return valuesOf(data, name, shape);
+}
+
+std::vector<double> Hdf5File::readAll(const std::string &name, std::vector<hsize_t> *shape) const {
+  const Hdf5Dataset data = datasetAt(name);
+  *shape = shapeOf(data);
+  return valuesOf(data, name, *shape);
+}
+
+Hdf5Dataset Hdf5File::datasetAt(const std::string &name) const {
+  if (!has(name)) throw SceneError(path_ + ": has no dataset '" + name + "'");
+  return checked(H5Dopen2(file_, name.c_str(), H5P_DEFAULT), path_ + ": '" + name + "' is not a dataset");
+}
+
+std::vector<hsize_t> Hdf5File::shapeOf(hid_t data) {
+  const Hdf5Space space = H5Dget_space(data);
+  const int rank = H5Sget_simple_extent_ndims(space);
+  std::vector<hsize_t> shape(std::size_t(std::max(rank, 1)), rank > 0 ? 1 : 0);
+  if (rank > 0) H5Sget_simple_extent_dims(space, shape.data(), nullptr);
+  return shape;
+}
+
+std::vector<double> Hdf5File::valuesOf(hid_t data, const std::string &name, const std::vector<hsize_t> &shape) const {
   // Rows that were declared but never written would be zeros. Compressed, a byte stands for a thousand at most.
   constexpr hsize_t most_rows = 50'000'000, most_compressed = 1100;
   if (shape[0] > most_rows)
     throw SceneError(path_ + ": dataset '" + name + "' declares " + std::to_string(shape[0]) + " rows, at most " +
                      std::to_string(most_rows) + " are read");
-  const hsize_t values_count = shape[0] * columns, stored = H5Dget_storage_size(data);
+  hsize_t values_count = 1;
+  for (const hsize_t n : shape) values_count *= std::min(n, most_rows);
+  const hsize_t stored = H5Dget_storage_size(data);
   if (values_count / most_compressed > stored)
     throw SceneError(path_ + ": dataset '" + name + "' declares " + std::to_string(shape[0]) +
                      " rows, but the file holds only " + std::to_string(stored) + " bytes of them");
+  if (values_count > 6 * most_rows) throw SceneError(path_ + ": dataset '" + name + "' has too many numbers");
   std::vector<double> values(values_count);
   checked(H5Dread(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()),
           path_ + ": '" + name + "' does not hold numbers");

@@ -231,6 +231,7 @@ void readStatics(Texts &texts, Options *o) {
 
 void readOutput(Texts &texts, Options *o) {
   o->output_dir = texts.text("-output_dir");
+  o->output_shapes = texts.text("-output_shapes");
   o->output_interval = o->loop.output_interval = texts.number("-output_interval");
   o->checkpoint_interval = texts.integer("-checkpoint_interval");
   o->restart = texts.text("-restart");

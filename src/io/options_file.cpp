@@ -69,6 +69,7 @@ private:
   void putOutput() {
     list("gravity", scene.gravity.data(), scene.gravity.data() + 3);
     put("output_dir", o.output_dir);
+    if (!o.output_shapes.empty()) put("output_shapes", o.output_shapes);
     put("output_interval", o.output_interval);
     put("checkpoint_interval", o.checkpoint_interval);
     if (!o.restart.empty()) put("restart", o.restart);

@@ -1,6 +1,6 @@
 #include "tendril/io/polyline_reader.hpp"
 
-#include "tendril/io/hdf5.hpp"
+#include "tendril/io/shape_file.hpp"
 #include "tendril/io/text.hpp"
 #include "tendril/model/scene.hpp"
 
@@ -154,33 +154,6 @@ std::vector<Polyline> readObj(std::istream &file, const std::string &path) {
   return chains.polylines(vertices);
 }
 
-std::vector<Polyline> readHdf5(const std::string &path) {
-  const Hdf5File file = Hdf5File::open(path);
-  const std::vector<double> x = file.read("position", 3);
-  const int n = int(x.size() / 3);
-  std::vector<double> offsets{0, double(n)}, closed;
-  if (file.has("rod_vertex_offsets")) offsets = file.read("rod_vertex_offsets", 1);
-  if (file.has("closed")) closed = file.read("closed", 1);
-  bool fits = offsets.size() >= 2 && offsets.front() == 0 && offsets.back() == n;
-  for (std::size_t r = 0; r + 1 < offsets.size(); ++r)
-    fits = fits && offsets[r + 1] == std::round(offsets[r + 1]) && offsets[r] + 2 <= offsets[r + 1];
-  if (!fits)
-    throw SceneError(path + ": 'rod_vertex_offsets' must rise from 0 to " + std::to_string(n) +
-                     ", the number of rows of 'position', by two or more a rod");
-  if (!closed.empty() && closed.size() + 1 != offsets.size())
-    throw SceneError(path + ": 'closed' must have one number per rod (" + std::to_string(offsets.size() - 1) +
-                     "), found " + std::to_string(closed.size()));
-  std::vector<Polyline> lines;
-  for (std::size_t r = 0; r + 1 < offsets.size(); ++r) {
-    Polyline line;
-    for (int v = int(offsets[r]); v < int(offsets[r + 1]); ++v)
-      line.points.emplace_back(x[3 * v], x[3 * v + 1], x[3 * v + 2]);
-    line.closed = r < closed.size() && closed[r] != 0;
-    lines.push_back(line);
-  }
-  return lines;
-}
-
 std::string textOf(const std::string &path, const std::string &missing) {
   constexpr std::size_t most = 2'000'000'000;
   std::string text = readBytes(path, missing, most);
@@ -188,12 +161,6 @@ std::string textOf(const std::string &path, const std::string &missing) {
     fail(path, 1 + int(std::count(text.begin(), text.begin() + std::ptrdiff_t(at), '\n')),
          "the byte 0x00 is no text; save the file as UTF-8");
   return text;
-}
-
-std::string extensionOf(const std::string &path) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), ::tolower);
-  return extension;
 }
 
 } // namespace
@@ -204,16 +171,15 @@ std::vector<Polyline> readPolylines(const std::string &path) {
   const std::string extension = extensionOf(path);
   const std::string missing = ": cannot be opened; check the path (it is relative to the scene file)";
   if (std::filesystem::is_directory(path)) throw SceneError(path + missing);
-  std::istringstream file(isTextPolyline(path) ? textOf(path, missing) : "");
+  if (extension == ".json" || !isTextPolyline(path)) return readShapes(path);
+  std::istringstream file(textOf(path, missing));
   std::vector<Polyline> lines;
   if (extension == ".csv" || extension == ".txt")
     lines = readPoints(file, path);
   else if (extension == ".obj")
     lines = readObj(file, path);
-  else if (!isTextPolyline(path))
-    lines = readHdf5(path);
   else
-    throw SceneError(path + ": unknown kind of file '" + extension + "'; use .csv, .txt, .obj, .h5 or .hdf5");
+    throw SceneError(path + ": unknown kind of file '" + extension + "'; use .csv, .txt, .obj, .json, .h5 or .hdf5");
   if (lines.empty())
     throw SceneError(path + ": holds no polyline" + (extension == ".obj" ? "; write one as an element 'l 1 2 3'" : ""));
   return lines;

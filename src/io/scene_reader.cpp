@@ -4,6 +4,7 @@
 #include "tendril/io/collider_reader.hpp"
 #include "tendril/io/junction_reader.hpp"
 #include "tendril/io/polyline_reader.hpp"
+#include "tendril/io/skin_reader.hpp"
 #include "tendril/io/support_reader.hpp"
 #include "tendril/io/text.hpp"
 #include "tendril/io/yaml.hpp"
@@ -90,11 +91,19 @@ void place(const YamlValue &value, std::vector<Polyline> &shapes) {
   auto placed = [=](const Vec3 &x) { return Vec3(turn * (scale * x) + translation); };
   for (Polyline &shape : shapes) {
     for (Vec3 &x : shape.points) x = placed(x);
+    for (Vec3 &d : shape.directors) d = turn * d;
+    if (shape.skin) {
+      auto skin = std::make_shared<Skin>(*shape.skin);
+      for (SkinPoint &point : skin->points)
+        for (Vec3 &local : point.local) local *= scale;
+      shape.skin = skin;
+    }
     if (shape.curve) shape.curve = [placed, curve = shape.curve](double s) { return placed(curve(s)); };
   }
 }
 
-void readDirectors(YamlMap &map, Rod &rod) {
+/// \param of_file those that the shape has in its file
+void readDirectors(YamlMap &map, const std::vector<Vec3> &of_file, Rod &rod) {
   if (map.has("rods[].directors")) {
     const YamlValue list = map.at("rods[].directors");
     const auto items = list.items();
@@ -111,6 +120,15 @@ void readDirectors(YamlMap &map, Rod &rod) {
     return;
   }
   Vec3 start = Vec3::Zero();
+  if (!of_file.empty() && int(of_file.size()) == rod.edges()) {
+    if (map.has("rods[].director"))
+      map.at("rods[].director").fail("the file has directors of its own; take 'director' away, or write 'directors'");
+    for (int i = 0; i < rod.edges(); ++i) { // what is normal to rounding stays as it is
+      const Vec3 &d = of_file[std::size_t(i)], clean = orthonormalised(d, rod.edge(i).normalized());
+      rod.director.push_back((clean - d).norm() < 1e-14 ? d : clean);
+    }
+    return;
+  }
   if (map.has("rods[].director")) {
     const YamlValue v = map.at("rods[].director");
     start = unit(v);
@@ -165,8 +183,10 @@ struct Copies {
   Vec3 offset = Vec3::Zero(); ///< from one to the next [m]
 };
 
-/// One of the rods of a block: a shape, moved. \param rod all but that, and `closed` as written
-void addRod(YamlMap &map, Rod rod, const Polyline &shape, const Vec3 &shift, double least_edges, SceneFile &out) {
+/// One of the rods of a block: a shape, moved. \param rod all but that, and `closed` as written \param skin its mesh is
+/// moved, too
+void addRod(YamlMap &map, Rod rod, const Polyline &shape, const Vec3 &shift, double least_edges, const SkinRecipe &skin,
+            SceneFile &out) {
   const bool by_one_more_edge = rod.closed && !shape.closed; // to us such a curve is points
   rod.position = shape.points;
   rod.closed = shape.closed || rod.closed;
@@ -176,16 +196,20 @@ void addRod(YamlMap &map, Rod rod, const Polyline &shape, const Vec3 &shift, dou
   } catch (const SceneError &e) {
     map.value().fail(e.what());
   }
-  readDirectors(map, rod);
+  readDirectors(map, shape.directors, rod);
   if (rod.closed && rod.initial_turns != std::round(rod.initial_turns))
     map.at("rods[].turns").fail("'turns' of a closed rod must be a whole number, or its ends do not meet");
   if (rod.material.isCable() && rod.initial_turns != 0)
     map.at("rods[].turns").fail("a rod without flexural stiffness has no twist");
   Drawing &drawing = out.drawings.emplace_back();
-  drawing.directors_given = map.has("rods[].directors");
+  drawing.directors_given = map.has("rods[].directors") || !shape.directors.empty();
   drawing.least_edges = least_edges;
   if (shape.curve && !by_one_more_edge)
     drawing.curve = [curve = shape.curve, shift](double s) { return Vec3(curve(s) + shift); };
+  if (shape.skin && !map.has("rods[].skin"))
+    giveSkin(shape.skin, rod);
+  else
+    putSkin(map, skin, shift, rod, out);
   out.names.add(rod.name);
   out.scene.rods.push_back(std::move(rod));
 }
@@ -216,6 +240,7 @@ void readRod(const YamlValue &value, const Overrides &overrides, SceneFile &out,
   if (map.has("rods[].layer")) common.layer = readName(map.at("rods[].layer"));
   common.contact = sums.contact;
   readContact(map, common.contact);
+  const SkinRecipe skin = readSkin(map, int(shapes.size()), common.material);
   Copies copies;
   if (map.has("rods[].copies")) {
     YamlMap m(map.at("rods[].copies"), "rods[].copies");
@@ -234,7 +259,7 @@ void readRod(const YamlValue &value, const Overrides &overrides, SceneFile &out,
       Rod rod = common;
       if (shapes.size() > 1) rod.name += "." + std::to_string(k);
       if (copies.count > 1) rod.name += "#" + std::to_string(copy);
-      addRod(map, std::move(rod), shapes[k], Vec3(double(copy) * copies.offset), least_edges, out);
+      addRod(map, std::move(rod), shapes[k], Vec3(double(copy) * copies.offset), least_edges, skin, out);
     }
   map.finish();
 }

@@ -3,6 +3,7 @@
 #include "tendril/model/scene.hpp"
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <string_view>
 
@@ -92,6 +93,13 @@ std::string inOneLine(std::string text) {
 std::string excerpt(const std::string &text) {
   constexpr std::size_t most = 60;
   return "'" + (text.size() > most ? text.substr(0, most) + "..." : text) + "'";
+}
+
+std::string extensionOf(const std::string &path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return char(std::tolower(c)); });
+  return extension;
 }
 
 } // namespace tendril

@@ -1,6 +1,8 @@
 /// What a trajectory says once: topology, materials, supports, where the run came from.
 #include "tendril/io/trajectory.hpp"
 
+#include "tendril/io/shape_file.hpp"
+
 namespace tendril {
 
 /// Radius of a tube that stands for a rod: the mean of the half axes, or without a section that of a homogeneous round
@@ -62,6 +64,7 @@ void TrajectoryWriter::writeHeader(const Scene &scene, const Elements &elements,
   file_.write("reference/director", {hsize_t(edges_), 3}, director.data(), "1");
   file_.write("reference/radius", {hsize_t(vertices_)}, radius.data(), "m");
   writeRods();
+  writeSkins();
   writeSupports();
   writeConstraints();
   writeColliders();
@@ -106,6 +109,11 @@ void TrajectoryWriter::writeRods() {
   file_.write("rods/section", sections);
   file_.write("rods/energy", energies);
   file_.write("rods/half_axes", {rods_, 2}, half_axes.data(), "m");
+}
+
+void TrajectoryWriter::writeSkins() {
+  if (std::none_of(scene_.rods.begin(), scene_.rods.end(), [](const Rod &rod) { return bool(rod.skin); })) return;
+  write(file_, SkinTables(scene_.rods));
 }
 
 void TrajectoryWriter::writeSupports() {

@@ -189,7 +189,7 @@ rows = [
     ("tube inside out", (support, support + "\ncolliders: [{tube: {bore: 0.1, outer: 0.05}}]"), [], ["scene.yaml:9", "'outer' must be larger than 'bore'"]),
     ("plane without a normal", (support, support + "\ncolliders: [{plane: {normal: [0, 0, 0]}}]"), [], ["scene.yaml:9", "'normal' must not be zero"]),
     ("mesh of no file", (support, support + "\ncolliders: [{mesh: {file: none.obj}}]"), [], ["none.obj", "cannot be opened"]),
-    ("mesh of another kind", (support, support + "\ncolliders: [{mesh: {file: two.csv}}]"), [], ["two.csv", ".obj or .stl"]),
+    ("mesh of another kind", (support, support + "\ncolliders: [{mesh: {file: two.csv}}]"), [], ["two.csv", ".obj, .off, .ply or .stl"]),
     ("mesh without triangles", (support, support + "\ncolliders: [{mesh: {file: points.obj}}]"), [], ["points.obj", "has no triangles"]),
     ("mesh that is cut off", (support, support + "\ncolliders: [{mesh: {file: cut.stl}}]"), [], ["cut.stl", "12 triangles", "684 bytes", "234", "cut off"]),
     ("mesh that ends in a facet", (support, support + "\ncolliders: [{mesh: {file: facet.stl}}]"), [], ["facet.stl", "within a facet"]),

@@ -132,6 +132,16 @@ def exampleScene(path, value):
             put(scene, path.rpartition(".")[0] + ".law", "penalty")
         if name in ("cloud", "exclusion_ratio"):
             put(scene, path.rpartition(".")[0] + ".collider", "point_cloud")
+    if "skin" in scene.get("rods", [{}])[0]:
+        skin = scene["rods"][0]["skin"]
+        if "mesh" in skin:
+            skin["mesh"]["file"] = os.path.abspath(f"{root}/data/meshes/plate.obj")
+        if "tube" in skin and "half_axes" not in skin["tube"]:
+            skin["tube"].setdefault("radius", 0.01)
+    if path.endswith("contact.on"):
+        put(scene, "rods[].skin", {"tube": {"sides": 6, "radius": 0.01}})
+    if name == "quadrature" and yaml.safe_load(keys[path]["example"]) == 6:
+        put(scene, path.rpartition(".")[0] + ".on", "surface")
     if path.startswith("junctions"):  # a second rod begins where the first one ends
         put(scene, "rods[].line", {"from": [0, 0, 0], "to": [1, 0, 0], "edges": 6})
         put(scene, "supports[].rod", 0)

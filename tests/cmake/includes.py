@@ -8,7 +8,7 @@ import re
 import sys
 from pathlib import Path
 
-ORDER = "geometry model layout state energy coupling contact embedding solver dynamics accuracy io".split()
+ORDER = "geometry model layout state energy coupling embedding contact solver dynamics accuracy io".split()
 root = Path(sys.argv[1])
 MOST_LINES = 400
 upward, found = [], 0

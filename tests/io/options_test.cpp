@@ -7,7 +7,7 @@
 namespace tendril::test {
 namespace {
 
-RunSettings settingsOf(const std::string &mode) {
+RunSettings settingsFrom(const std::string &mode) {
   RunSettings run;
   run.mode = mode;
   run.dt = 0.02;
@@ -18,31 +18,31 @@ RunSettings settingsOf(const std::string &mode) {
 
 TEST(Options, OfTheCommandLineGoBeforeThoseOfTheScene) {
   Options o;
-  resolve(settingsOf("dynamic"), o);
+  resolve(settingsFrom("dynamic"), o);
   EXPECT_TRUE(o.loop.dynamic);
   EXPECT_EQ(o.loop.dt, 0.02);
   EXPECT_EQ(o.loop.t_end, 3);
   Options given;
   given.dt = 0.01;
-  resolve(settingsOf("dynamic"), given);
+  resolve(settingsFrom("dynamic"), given);
   EXPECT_EQ(given.loop.dt, 0.01);
   EXPECT_EQ(given.loop.t_end, 3);
   Options statics;
   statics.mode = "static";
-  resolve(settingsOf("dynamic"), statics);
+  resolve(settingsFrom("dynamic"), statics);
   EXPECT_FALSE(statics.loop.dynamic);
   EXPECT_EQ(statics.loop.dt, 0.25);
   EXPECT_EQ(statics.loop.t_end, 1);
   statics = {};
   statics.given_load_steps = 10;
-  resolve(settingsOf("static"), statics);
+  resolve(settingsFrom("static"), statics);
   EXPECT_EQ(statics.loop.dt, 0.1);
 }
 
 /// The message, empty where nothing is refused.
 std::string refusalOf(const std::string &mode, Options o) {
   try {
-    resolve(settingsOf(mode), o);
+    resolve(settingsFrom(mode), o);
   } catch (const SceneError &e) {
     return e.what();
   }

@@ -6,7 +6,7 @@
 
 namespace tendril {
 
-/// Whether friction acts at the surface of a rod, whose frames it turns; cables have none.
+/// Whether a rod is touched at its surface, by its skin or by friction, whose frames that turns; cables have none.
 bool carriesSurface(const Rod &rod);
 
 /// Stiffness of the barrier of a rod [N/m]: ten times its weight per length, or where it has more to bear as much as
@@ -17,7 +17,7 @@ double barrierStiffness(const Scene &scene, const Elements &elements, double for
 
 /// A sample in contact, in the axes of the world.
 struct ContactPoint {
-  double at;      ///< part of its edge
+  EdgePoint rod;  ///< where it is
   Vec3 normal;    ///< gradient of the distance: out of the obstacle, of length 1 but where it is interpolated
   Vec3 force;     ///< on the rod [N]
   Mat3 stiffness; ///< second derivatives of the energy by its place: by the law, ... [N/m]
@@ -28,12 +28,12 @@ ContactPoint contactPoint(const Scene &scene, const RodContacts &rod, const Samp
 /// A sample in contact at a state.
 struct ContactReading {
   int rod, collider, edge;
-  double at;     ///< part of the edge
-  double gap;    ///< between surfaces [m]
-  Vec3 place;    ///< of the sample, on the axis of the rod [m]
-  Vec3 normal;   ///< out of the obstacle
-  Vec3 force;    ///< of the normal law, on the rod [N]
-  Vec3 friction; ///< and what else the obstacle does, friction and damping, in the step that led to the state [N]
+  EdgePoint point; ///< where it is
+  double gap;      ///< between surfaces [m]
+  Vec3 place;      ///< of the sample, on the axis of the rod or on its skin [m]
+  Vec3 normal;     ///< out of the obstacle
+  Vec3 force;      ///< of the normal law, on the rod [N]
+  Vec3 friction;   ///< and what else the obstacle does, friction and damping, in the step that led to the state [N]
 };
 /// \param c of the state
 std::vector<ContactReading> contactReadings(const Scene &scene, const Elements &elements, const State &state,

@@ -12,20 +12,21 @@
 
 namespace tendril {
 
-/// A sample that slides. Its point of the rod's surface is carried by the frame of its edge, which friction turns.
+/// A sample that slides. Its point of the rod's surface is carried by the frames of edges, which friction turns.
 struct SlidingPoint {
-  int slot, point, collider;   ///< of its edge; of samplePoints; of the scene
-  double at;                   ///< part of the edge
+  EdgePoint rod;               ///< where it is on the rod
+  int point = 0, collider = 0; ///< of samplePoints; of the scene
   double pressing;             ///< normal force [N]
   double coefficient;          ///< of friction
   Vec3 normal = Vec3::Zero();  ///< out of the obstacle, in the axes of the world
-  Vec3 arm = Vec3::Zero();     ///< from the axis of the rod, along tangent and both directors of the edge [m]
   Vec3 touched = Vec3::Zero(); ///< point of the obstacle, in its axes [m]
   Vec3 stick = Vec3::Zero();   ///< drawn from its anchor when the step began, in the axes of the world [m]
   Vec3 held = Vec3::Zero();    ///< friction on the rod when the step began, in the axes of the world [N]
   Vec3 start = Vec3::Zero();   ///< from that point to the rod's when the step began, in the axes of the world [m]
   SlidingPoint &slid() { return *this; }
-  bool isSame(const SlidingPoint &b) const { return slot == b.slot && point == b.point && collider == b.collider; }
+  bool isSame(const SlidingPoint &b) const {
+    return rod.slot() == b.rod.slot() && point == b.point && collider == b.collider;
+  }
 };
 
 /// What a sample remembers, or null. \param memory of its rod, in the order of keys
@@ -108,22 +109,5 @@ double renewSliding(std::vector<Point> &points, std::vector<Point> now, SlidingR
 
 /// The way of a point since the step began, relative to the obstacle.
 Vec3 wayOf(const SlidingPoint &point, const Configuration &c, const Collider::Pose &pose);
-
-/// Adds what acts on a point of the axis of a rod, at a part of an edge, to its two vertices.
-inline void spread(double at, int slot, const Vec3 &value, Planes &out) {
-  for (int a = 0; a < 3; ++a) {
-    out[a][slot] += (1 - at) * value[a];
-    out[a][slot + 1] += at * value[a];
-  }
-}
-
-/// Adds derivatives by the place of such a point. A quadratic form A of it is
-/// (1 - s) A(x_i) + s A(x_{i+1}) - s (1 - s) A(e_i): nothing that joins vertices. \param blocks or null
-void addOnAxis(double at, int slot, const Vec3 &gradient, const Mat3 &hessian, const BlockPlanes *blocks,
-               Derivatives &out);
-
-/// Adds what a point does to the derivatives of its rod. \param blocks or null
-void addSliding(const SlidingPoint &point, const SlidingForce &force, const Configuration &c, const BlockPlanes *blocks,
-                Derivatives &out);
 
 } // namespace tendril

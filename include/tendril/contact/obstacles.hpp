@@ -3,8 +3,8 @@
 /// Samples of rods against the obstacles of a scene: where they are near, their distances, and how far a motion is
 /// free. docs/theory.md, Contact.
 
+#include "tendril/contact/edge_point.hpp"
 #include "tendril/contact/law.hpp"
-#include "tendril/state/state.hpp"
 
 #include <algorithm>
 
@@ -43,8 +43,8 @@ double freeWay(const Shape &shape, const Vec3 &from, const Vec3 &way, double rad
 struct Samples {
   static constexpr int most = 128;
   int count = 0;
-  std::array<int, most> slot;  ///< of their edges
-  std::array<int, most> point; ///< of samplePoints
+  std::array<int, most> slot;  ///< of their edges, on a skin of the first that carries each
+  std::array<int, most> point; ///< of samplePoints, or among those of the skin with this edge
   std::array<double, most> distance;
   std::array<std::array<double, most>, 3> local; ///< in the axes of the obstacle
   Collider::Pose pose;
@@ -84,14 +84,24 @@ public:
   const NormalLaw &law() const { return law_; }
   /// Of a barrier [N/m].
   void setStiffness(double stiffness) { law_ = {settings_, stiffness}; }
-  const std::vector<SamplePoint> &points(int collider) const { return points_[collider]; }
+  EdgePoint pointOf(const Samples &samples, int k) const {
+    if (!skin_.empty()) return onSkin(samples, k).point;
+    return {samples.slot[k], points_[samples.collider][samples.point[k]].at};
+  }
   /// Weight of a sample: its part of the rod at rest [m].
   double weight(const Samples &samples, int k) const {
+    if (!skin_.empty()) return onSkin(samples, k).weight;
     return points_[samples.collider][samples.point[k]].weight * elements_.restLength()[samples.slot[k]];
   }
 
 private:
   static constexpr int chunk_edges = 16;
+  /// A sample on the skin.
+  struct OnSkin {
+    EdgePoint point;
+    int number;    ///< of those with its first edge
+    double weight; ///< its part of the rod at rest, as of all of the skin [m]
+  };
   const Scene &scene_;
   const Elements &elements_;
   const ContactSettings &settings_;
@@ -100,7 +110,12 @@ private:
   NormalLaw law_;
   std::vector<int> met_;                         ///< colliders that are there for the rod
   std::vector<std::vector<SamplePoint>> points_; ///< per collider
-  std::vector<double> walls_;                    ///< per collider: distance that no way passes [m]
+  std::vector<OnSkin> skin_;                     ///< in the order of their first edges; empty: samples are on the axis
+  std::vector<int> first_of_chunk_;              ///< of them, per chunk, and the end
+  /// How far samples are at most from the vertices of a chunk: so much, and this part of its longest edge; and how much
+  /// faster they go.
+  double arm_ = 0, apart_ = 0.5, gain_ = 1;
+  std::vector<double> walls_;         ///< per collider: distance that no way passes [m]
   std::vector<double> away_;          ///< per chunk and collider: no sample reaches an obstacle that moves less [m]
   std::vector<double> nearest_;       ///< per chunk: the least of these
   std::array<AlignedVector, 3> seen_; ///< vertices of each chunk, with both of its ends, where they were then [m]
@@ -108,9 +123,22 @@ private:
 
   int edgesOf(int chunk) const { return std::min(chunk_edges, rod_.edges - chunk * chunk_edges); }
   int chunks() const { return (rod_.edges + chunk_edges - 1) / chunk_edges; }
-  static int seenOf(int chunk) { return chunk * (chunk_edges + 1); }
+  static int seenOf(int chunk) { return chunk * (chunk_edges + 2); }
+  /// Vertices of a chunk: with those of the edge behind it, where samples of the skin are carried by both.
+  int verticesOf(int chunk) const {
+    return edgesOf(chunk) + 1 + (!skin_.empty() && (rod_.closed || chunk + 1 < chunks()) ? 1 : 0);
+  }
+  int samplesIn(int chunk, int collider) const {
+    return skin_.empty() ? edgesOf(chunk) * int(points_[collider].size())
+                         : first_of_chunk_[chunk + 1] - first_of_chunk_[chunk];
+  }
+  const OnSkin &onSkin(const Samples &samples, int k) const {
+    return skin_[first_of_chunk_[samples.chunk] + samples.first + k];
+  }
+  void takeSkin(const Rod &rod);
   double movedSince(const Configuration &c, int chunk) const;
   Samples samplesOf(const Configuration &c, int chunk, int collider, int first) const;
+  void placeSamples(const Configuration &c, Samples &out) const;
 };
 
 template <class Visit>
@@ -121,11 +149,10 @@ void RodContacts::visitNear(const Configuration &c, const Configuration *also, V
   for (int chunk = 0; chunk < chunks(); ++chunk) {
     const double moved = std::max(movedSince(c, chunk), also ? movedSince(*also, chunk) : 0);
     if (all_stood && moved < nearest_[chunk]) continue;
-    const int edges = edgesOf(chunk);
     for (const int k : met_) {
       const bool still = all_stood || !scene_.colliders[k].motion.moves();
       if (still && moved < away_[chunk * colliders + k]) continue;
-      for (int first = 0; first < edges * int(points_[k].size()); first += Samples::most) {
+      for (int first = 0; first < samplesIn(chunk, k); first += Samples::most) {
         Samples samples = samplesOf(c, chunk, k, first);
         visit(samples);
       }

@@ -23,12 +23,7 @@ inline const ContactSettings &settingsOf(const Scene &scene, const TouchingPair 
                            : scene.rods[std::size_t(pair.rodOf(side))].contact;
 }
 
-/// A point that the frame of an edge or of a body carries.
-struct CarriedPoint {
-  double at; ///< part of the edge
-  Vec3 arm;  ///< from there along tangent and both directors, or from the centre of mass as drawn [m]
-};
-/// Derivatives of such a point by the variables of its side.
+/// Derivatives of a point that a side carries by the variables of that side.
 OfPair::BySide byPoint(const TouchingPair &pair, int side, const CarriedPoint &point, const Configuration &c);
 /// Adds the second derivatives of g.y, with the point y, by the variables of its side.
 void addCurvature(const TouchingPair &pair, int side, const CarriedPoint &point, const Vec3 &g, const Configuration &c,

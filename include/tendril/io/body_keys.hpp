@@ -28,7 +28,7 @@ inline constexpr Key body_keys[] = {
     {"bodies[].cylinder.axis", KeyType::vector, "", "[0, 0, 1]", "of any length", anything, "", "[0, 1, 0]"},
     {"bodies[].mesh", KeyType::map, "", "(another shape, or none)",
      "a closed surface of triangles, the solid within it"},
-    {"bodies[].mesh.file", KeyType::file, "", "required", "an .obj or .stl file, beside the scene"},
+    {"bodies[].mesh.file", KeyType::file, "", "required", "an .obj, .off, .ply or .stl file, beside the scene"},
     {"bodies[].mesh.scale", KeyType::number, "", "1", "factor on its coordinates", positive, "", "1e-3"},
     {"bodies[].density", KeyType::number, "kg/m^3", "(or mass)", "of the whole shape", positive, "", "1000"},
     {"bodies[].mass", KeyType::number, "kg", "(or density)",

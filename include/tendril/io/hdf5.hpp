@@ -60,6 +60,8 @@ public:
   /// Whole dataset as doubles, row-major; `columns` is its last dimension (1 for a list).
   /// \param rows how many it has to have; another number is refused before there is memory for it
   std::vector<double> read(const std::string &name, hsize_t columns, std::optional<hsize_t> rows = {}) const;
+  /// Whole dataset as doubles, row-major, with its shape, which has one dimension at least.
+  std::vector<double> readAll(const std::string &name, std::vector<hsize_t> *shape) const;
   /// Text of a dataset, of no more than `most` bytes.
   std::string readText(const std::string &name, std::size_t most) const;
   /// Attributes of the file: a number, a text; nothing where there is none, or something else.
@@ -93,6 +95,9 @@ private:
 
   void writeStrings(const std::string &name, hid_t space, std::size_t width, const char *values);
   Hdf5Object objectAt(const std::string &name) const;
+  Hdf5Dataset datasetAt(const std::string &name) const;
+  static std::vector<hsize_t> shapeOf(hid_t data);
+  std::vector<double> valuesOf(hid_t data, const std::string &name, const std::vector<hsize_t> &shape) const;
 };
 
 /// A dataset that grows by one slab per append: shape (n, slab...). Small slabs wait in memory until flush() and are

@@ -34,6 +34,7 @@ struct Options {
   std::optional<Vec3> gravity;
   std::vector<std::pair<std::string, int>> rod_edges; ///< by names of rods, in order of the command line
   std::string output_dir = "out";
+  std::string output_shapes; ///< file for the rods as drawn; empty: none
   double output_interval = 0;
   int checkpoint_interval = 0;        ///< steps; 0: only at the end
   std::string restart;                ///< checkpoint to go on from, `auto`, or empty

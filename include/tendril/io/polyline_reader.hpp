@@ -11,8 +11,7 @@ namespace tendril {
 /// Reads all polylines of a file, by its extension:
 ///   .csv .txt  one point per line, three numbers separated by commas or blanks; `#` begins a comment, an empty line
 ///   ends a polyline; .obj       `v` vertices and `l` elements; those that share vertices are one polyline, closed
-///   where it ends where it began; .h5 .hdf5  dataset `position` (n,3), and optionally `rod_vertex_offsets` (nr+1) and
-///   `closed` (nr).
+///   where it ends where it began; .h5 .hdf5 .json  with directors and skins, see readShapes.
 /// \throws SceneError with file and line
 std::vector<Polyline> readPolylines(const std::string &path);
 

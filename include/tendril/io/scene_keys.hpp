@@ -3,12 +3,16 @@
 /// The keys of a scene.
 
 #include "tendril/io/key.hpp"
+#include "tendril/model/skin.hpp"
 
 namespace tendril {
 
 // clang-format off
 /// How rods touch obstacles: in a block of the scene, and in one of each rod.
 #define TENDRIL_CONTACT_KEYS(block)                                                                                    \
+  {block ".on", KeyType::word, "", "axis",                                                                             \
+   "where it touches obstacles and bodies: about points of its axis, by its radius, or at points of its skin",         \
+   anything, "axis|surface", "surface"},                                                                               \
   {block ".rods", KeyType::word, "", "none",                                                                           \
    "which other rods it touches, of those that touch it: none, others, or all, itself, too", anything,                 \
    "none|others|all", "all"},                                                                                          \
@@ -29,7 +33,8 @@ namespace tendril {
    "width of the barrier: surfaces that touch are at most half of it apart, or overlap by that", positive, "",         \
    "1e-3"},                                                                                                            \
   {block ".stiffness", KeyType::number, "N/m, N/m^2", "(barrier: by the loads; penalty: 1e9)",                         \
-   "of a barrier, force per length; of a penalty, that over the depth", positive, "", "100"},                          \
+   "of a barrier, force per length; of a penalty, that over the depth; on: surface, both per area", positive, "",      \
+   "100"},                                                                                                             \
   {block ".threshold", KeyType::number, "m", "1e-3", "of a penalty: distance at which it begins", anything, "",        \
    "2e-3"},                                                                                                            \
   {block ".smoothing", KeyType::number, "m", "5e-3",                                                                   \
@@ -50,8 +55,8 @@ namespace tendril {
   {block ".normal_damping", KeyType::number, "s/m", "0",                                                               \
    "Hunt and Crossley's: of the normal force, by the velocity normal to the surface", not_negative, "", "0.1"},        \
   {block ".quadrature", KeyType::word, "", "auto",                                                                     \
-   "points of an edge that touch: as the obstacle's curvature asks, or so many Gauss points", anything,                \
-   "auto|1|2|3", "3"}
+   "points of an edge that touch: as the obstacle's curvature asks, or so many Gauss points; or 1, 3, 6 of a triangle", \
+   anything, "auto|1|2|3|6", "3"}
 // clang-format on
 
 inline constexpr Key scene_keys[] = {
@@ -166,6 +171,33 @@ inline constexpr Key scene_keys[] = {
      not_negative, "", "0.1"},
     {"rods[].material.stiffness_damping_coefficient", KeyType::number, "s", "0",
      "dissipation proportional to stiffness", not_negative, "", "1e-3"},
+    {"rods[].skin", KeyType::map, "", "(none)",
+     "a surface of triangles that goes with the rod: in pictures, and where 'contact: {on: surface}' touches"},
+    {"rods[].skin.tube", KeyType::map, "", "(none)", "a tube about the rod, with caps at its ends"},
+    {"rods[].skin.tube.sides", KeyType::integer, "", "12", "of its section", {3, 10000}, "", "8"},
+    {"rods[].skin.tube.radius", KeyType::number, "m", "(of the section)", "of its corners", positive, "", "0.01"},
+    {"rods[].skin.tube.half_axes", KeyType::pair, "m", "(of the section)",
+     "in place of the radius: of an ellipse, along the first and the second director", positive, "", "[0.01, 0.02]"},
+    {"rods[].skin.tube.frames", KeyType::word, "", "(directors where half axes differ, else natural)",
+     "from where its corners count: frames that turn as little as they can, or the directors", anything,
+     "natural|directors", "directors"},
+    {"rods[].skin.tube.area", KeyType::word, "", "inscribed",
+     "its corners are on the section, or farther out so that its polygon has the area of the section", anything,
+     "inscribed|preserved", "preserved"},
+    {"rods[].skin.mesh", KeyType::map, "", "(none)", "triangles about the rod as it is drawn, beside a tube or alone"},
+    {"rods[].skin.mesh.file", KeyType::file, "", "required", "an .obj, .off, .ply or .stl file, beside the scene"},
+    {"rods[].skin.mesh.scale", KeyType::number, "", "1", "factor of all coordinates", positive, "", "1e-3"},
+    {"rods[].skin.mesh.rotation", KeyType::vector, "rad", "[0, 0, 0]", "rotation vector: axis times angle", anything,
+     "", "[0, 0, 1.5708]"},
+    {"rods[].skin.mesh.translation", KeyType::vector, "m", "[0, 0, 0]", "added last", anything, "", "[0, 0, 1]"},
+    {"rods[].skin.mesh.edges",
+     KeyType::integer,
+     "",
+     "2",
+     "that carry a point: the nearest, or as many along the rod between whose middles it changes over",
+     {1, SkinPoint::most},
+     "",
+     "3"},
     {"rods[].contact", KeyType::word_or_map, "", "(as the scene)",
      "how it touches obstacles and rods; none: not at all", anything, "none", "none"},
     TENDRIL_CONTACT_KEYS("rods[].contact"),
@@ -294,7 +326,7 @@ inline constexpr Key scene_keys[] = {
     {"colliders[].tube.axis", KeyType::vector, "", "[0, 0, 1]", "of any length", anything, "", "[1, 0, 0]"},
     {"colliders[].mesh", KeyType::map, "", "(another shape)",
      "a closed surface of triangles, by a grid of its distances"},
-    {"colliders[].mesh.file", KeyType::file, "", "required", "an .obj or .stl file, beside the scene"},
+    {"colliders[].mesh.file", KeyType::file, "", "required", "an .obj, .off, .ply or .stl file, beside the scene"},
     {"colliders[].mesh.scale", KeyType::number, "", "1", "factor on its coordinates", positive, "", "1e-3"},
     {"colliders[].mesh.cell", KeyType::number, "m", "(a 64th of its longest side)", "edge of the cells of the grid",
      positive, "", "2e-3"},

@@ -21,6 +21,9 @@ std::string printable(const std::string &text);
 /// Control characters, newlines too, as question marks.
 std::string inOneLine(std::string text);
 
+/// Of a file, in lower case: `.obj`.
+std::string extensionOf(const std::string &path);
+
 /// In quotes, with at most 60 bytes.
 std::string excerpt(const std::string &text);
 

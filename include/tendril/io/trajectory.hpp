@@ -79,6 +79,7 @@ private:
   void writeRods();
   void writeSupports();
   void writeConstraints(); ///< name, type, rod, and the vertex of a pin or edge of a rotation
+  void writeSkins();       ///< triangles of each rod, and how its points go with edges (SkinPoint)
   void writeColliders();   ///< name, shape, its parameters, and position and rotation without motion
   void writeJoints();      ///< name, type, bodies, point and axis as drawn
   void writeBodies();      ///< name, shape, its parameters, mass properties as drawn; and what is tied to them

@@ -18,6 +18,8 @@ struct ContactSettings {
   /// which gives way.
   enum class Law { barrier, penalty };
   bool on = true;
+  /// Whether samples are on its skin, and not on its axis with its radius about them.
+  bool on_surface = false;
   /// Which rods it touches, of those that say the same of it.
   enum class Rods { none, others, all };
   Rods rods = Rods::none;
@@ -50,7 +52,8 @@ struct ContactSettings {
   /// Rods and bodies that are not there for each other: those of which one has a bit of `apart_from` that the other has
   /// of `apart_to`.
   std::uint64_t apart_from = 0, apart_to = 0;
-  int quadrature = 0; ///< Gauss points of an edge; 0: vertices, and points between where obstacles curve
+  /// Gauss points of an edge; 0: vertices, and points between where obstacles curve. On a skin, those of a triangle.
+  int quadrature = 0;
 
   static ContactSettings none() {
     ContactSettings settings;
@@ -70,6 +73,8 @@ struct ContactSettings {
   double wall(const Shape &shape) const {
     return isBarrier() ? -0.5 * distance : radius > 0 ? -0.8 * radius : -0.8 * shape.depth();
   }
+  /// About a sample [m].
+  double padding() const { return on_surface ? 0 : radius; }
   bool slides() const { return friction > 0 || tangential_damping > 0 || normal_damping > 0; }
   bool isAnchored(bool is_static) const { return stick == Stick::anchored || (is_static && stick != Stick::creep); }
   bool operator==(const ContactSettings &) const = default;

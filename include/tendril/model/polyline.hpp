@@ -2,7 +2,7 @@
 /// \file polyline.hpp
 /// Points in order, from which rods are made.
 
-#include "tendril/geometry/scalar.hpp"
+#include "tendril/model/skin.hpp"
 
 #include <functional>
 #include <vector>
@@ -15,7 +15,9 @@ using Curve = std::function<Vec3(double)>;
 struct Polyline {
   std::vector<Vec3> points; ///< [m]; the first is not repeated at the end of a closed one
   bool closed = false;
-  Curve curve; ///< that the points were taken from; empty where there are only points
+  Curve curve;                      ///< that the points were taken from; empty where there are only points
+  std::vector<Vec3> directors;      ///< of its edges; empty where the file has none
+  std::shared_ptr<const Skin> skin; ///< that the file has, or null
 };
 
 } // namespace tendril

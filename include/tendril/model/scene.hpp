@@ -7,6 +7,7 @@
 #include "tendril/model/contact.hpp"
 #include "tendril/model/joint.hpp"
 #include "tendril/model/material.hpp"
+#include "tendril/model/skin.hpp"
 #include "tendril/model/strain.hpp"
 
 #include <cstdint>
@@ -37,6 +38,7 @@ struct Rod {
   Energy energy = Energy::seed;
   bool gravity = true;
   ContactSettings contact;
+  std::shared_ptr<const SkinRecipe> skin; ///< null: none
   /// Natural curvature about the two directors and twist (each [1/m]) where the rod is not stress-free as drawn.
   enum class Natural { as_drawn, given } natural = Natural::as_drawn;
   Vec3 natural_strain = Vec3::Zero(); ///< (curvature 1, curvature 2, twist) for Natural::given; zero is a straight rod

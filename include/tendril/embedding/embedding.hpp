@@ -1,0 +1,47 @@
+#pragma once
+/// \file embedding.hpp
+/// How surfaces go with rods: tubes about them, and meshes whose points are carried by the edges beside them
+/// (docs/theory.md, Skins).
+
+#include "tendril/model/scene.hpp"
+
+namespace tendril {
+
+/// A tube about a rod as drawn: of n edges and S sides, S (n + 2) + 2 points and 2 S (n + 2) triangles with its caps,
+/// or S n and 2 S n about a ring.
+Skin tubeAbout(const Rod &rod, const SkinRecipe::Tube &tube);
+/// A mesh about a rod as drawn. The edges that carry a point are those beside the nearest point of the polyline: that
+/// edge (1), the two whose middles are on both sides of it, linear in arc length (2), or three by a quadratic B-spline.
+/// Beyond the ends it is the last edge alone. Near in space counts once only: the rest goes along the rod.
+Skin embedded(const Rod &rod, const TriangleMesh &mesh, int edges);
+/// All of a rod; nothing where it has none.
+Skin skinOf(const Rod &rod);
+
+/// Where a point of a skin is on the rod as drawn [m].
+Vec3 placeOf(const Rod &rod, const SkinPoint &point);
+
+/// A point of a surface with its part of the area.
+struct SkinSample {
+  SkinPoint point; ///< carried by no more than two edges
+  double area;     ///< as drawn [m^2]
+};
+/// Points of the triangles by which a surface is integrated, each carried by itself by those edges that carry the
+/// corners: 1 (the middle), 3 (of degree 2) or 6 of each (of degree 4; D. A. Dunavant, High degree efficient
+/// symmetrical Gaussian quadrature rules for the triangle, Int. J. Numer. Meth. Eng. 21, 1985). In the order of their
+/// first edges.
+std::vector<SkinSample> skinSamples(const Rod &rod, const Skin &skin, int points, int edges);
+
+/// Area [m^2] of a skin as drawn, and the volume in it where it is closed [m^3].
+struct SkinMeasure {
+  double area = 0, volume = 0;
+};
+SkinMeasure measureOf(const Rod &rod, const Skin &skin);
+/// Throws std::invalid_argument that says what is wrong with a surface that is not closed, or inside out.
+void checkClosed(const Rod &rod, const Skin &skin);
+/// Largest turn of the tangents of two edges that carry one point, as drawn [rad]; linear weights shrink the section
+/// there by the cosine of its half.
+double widestTurn(const Rod &rod, const Skin &skin);
+/// Largest distance of points from the rod over the middle one.
+double farthestOverMedian(const Rod &rod, const Skin &skin);
+
+} // namespace tendril
