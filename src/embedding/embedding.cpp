@@ -10,7 +10,6 @@ namespace {
 /// Where a rod as drawn comes nearest to a point.
 struct OnRod {
   int edge = 0;
-  double part = 0; ///< of the edge
   double squared = HUGE_VAL;
 };
 
@@ -56,37 +55,65 @@ private:
     const Vec3 &from = rod_.position[std::size_t(edge)], e = rod_.edge(edge);
     const double part = std::clamp((y - from).dot(e) / e.squaredNorm(), 0.0, 1.0);
     const double squared = (y - from - part * e).squaredNorm();
-    if (squared < best.squared) best = {edge, part, squared};
+    if (squared < best.squared) best = {edge, squared};
   }
 };
 
-/// Carried by no more than so many edges, of `count` from `first` on.
-SkinPoint carried(const Rod &rod, const Vec3 &y, const OnRod &at, int edges, int first, int count) {
-  SkinPoint point;
-  const int n = rod.edges();
-  auto isThere = [&](int edge) { return (rod.closed || (edge >= 0 && edge < n)) && (edge - first + n) % n < count; };
-  auto add = [&](int edge, double weight) {
-    if (!(weight > 0)) return;
-    edge = (edge + n) % n;
-    const Frame f = referenceFrame(rod, edge);
-    const Vec3 from = y - (rod.position[std::size_t(edge)] + 0.5 * rod.edge(edge));
-    point.add(edge, weight, {from.dot(f.tangent), from.dot(f.director), from.dot(f.secondDirector())});
+/// Some of the edges of a rod: so many from one on, of a ring over its end.
+struct Window {
+  const Rod &rod;
+  int first, count;
+  int wrapped(int edge) const { return (edge + rod.edges()) % rod.edges(); }
+  bool has(int edge) const {
+    return (rod.closed || (edge >= 0 && edge < rod.edges())) && wrapped(wrapped(edge) - first) < count;
+  }
+};
+
+/// Part of an edge at which a point is, between the planes that halve the angles with its neighbours: it goes over from
+/// edge to edge without a jump. Less than 0 or more than 1 where the point is beyond one of them.
+double partOf(const Rod &rod, int edge, const Vec3 &y) {
+  const int before = rod.edgeBefore(edge), after = rod.edgeAfter(rod.next(edge));
+  const Vec3 own = rod.edge(edge).normalized();
+  auto beyond = [&](int neighbour, int vertex) {
+    const Vec3 across = neighbour < 0 ? own : Vec3(own + rod.edge(neighbour).normalized());
+    return (y - rod.position[std::size_t(vertex)]).dot(across.normalized());
   };
-  const int step = at.part < 0.5 ? -1 : 1, other = at.edge + step;
-  const bool ends = !isThere(at.edge - 1) || !isThere(at.edge + 1);
-  if (edges == 1 || !isThere(other))
-    add(at.edge, 1);
+  const double from = beyond(before, edge), to = -beyond(after, rod.next(edge));
+  return from <= 0 ? std::min(from, -1e-300) : to <= 0 ? 1 - std::min(to, -1e-15) : from / (from + to);
+}
+
+/// Carried by no more than so many edges of a window. \param edge the nearest
+SkinPoint carried(const Window &window, const Vec3 &y, int edge, int edges) {
+  const Rod &rod = window.rod;
+  double part = partOf(rod, edge, y);
+  // Outside a bend the vertex is nearest, which both edges have: the plane between them decides.
+  if (const int other = edge + (part < 0 ? -1 : 1); (part < 0 || part > 1) && window.has(other)) {
+    edge = window.wrapped(other);
+    part = partOf(rod, edge, y);
+  }
+  part = std::clamp(part, 0.0, 1.0);
+  SkinPoint point;
+  auto add = [&](int to, double weight) {
+    if (!(weight > 0)) return;
+    to = window.wrapped(to);
+    const Frame f = referenceFrame(rod, to);
+    const Vec3 from = y - (rod.position[std::size_t(to)] + 0.5 * rod.edge(to));
+    point.add(to, weight, {from.dot(f.tangent), from.dot(f.director), from.dot(f.secondDirector())});
+  };
+  const int step = part < 0.5 ? -1 : 1, other = edge + step;
+  const bool ends = !window.has(edge - 1) || !window.has(edge + 1);
+  if (edges == 1 || !window.has(other))
+    add(edge, 1);
   else if (edges == 2 || ends) { // from middle to middle
-    const double own = rod.edge(at.edge).norm(), next = rod.edge((other + n) % n).norm();
-    const double weight = std::abs(at.part - 0.5) * own / (0.5 * (own + next));
+    const double own = rod.edge(edge).norm(), next = rod.edge(window.wrapped(other)).norm();
+    const double weight = std::abs(part - 0.5) * own / (0.5 * (own + next));
     if (step < 0) add(other, weight);
-    add(at.edge, 1 - weight);
+    add(edge, 1 - weight);
     if (step > 0) add(other, weight);
   } else {
-    const double u = at.part;
-    add(at.edge - 1, 0.5 * (1 - u) * (1 - u));
-    add(at.edge, 0.5 + u - u * u);
-    add(at.edge + 1, 0.5 * u * u);
+    add(edge - 1, 0.5 * (1 - part) * (1 - part));
+    add(edge, 0.5 + part - part * part);
+    add(edge + 1, 0.5 * part * part);
   }
   return point;
 }
@@ -137,7 +164,8 @@ Skin embedded(const Rod &rod, const TriangleMesh &mesh, int edges) {
   const Nearest nearest(rod);
   Skin skin;
   skin.triangles = mesh.triangles;
-  for (const Vec3 &y : mesh.vertices) skin.points.push_back(carried(rod, y, nearest.on(y), edges, 0, rod.edges()));
+  for (const Vec3 &y : mesh.vertices)
+    skin.points.push_back(carried({rod, 0, rod.edges()}, y, nearest.on(y).edge, edges));
   return skin;
 }
 
@@ -184,7 +212,7 @@ std::vector<SkinSample> skinSamples(const Rod &rod, const Skin &skin, int points
     const double area = 0.5 * (x[1] - x[0]).cross(x[2] - x[0]).norm();
     for (const RulePoint &p : rule) {
       const Vec3 y = p.at[0] * x[0] + p.at[1] * x[1] + p.at[2] * x[2];
-      samples.push_back({carried(rod, y, nearest.on(y, first, count), edges, first, count), p.weight * area});
+      samples.push_back({carried({rod, first, count}, y, nearest.on(y, first, count).edge, edges), p.weight * area});
     }
   }
   std::stable_sort(samples.begin(), samples.end(),
