@@ -32,7 +32,11 @@ public:
     TouchingPair own = pair;
     own.number -= first_number_;
     bool near = false;
-    bodies_.visit(own, c, 3 * bodies_.lawOf(own).reach(), [&](const TouchingSolid &) { near = true; });
+    const double reach = 3 * bodies_.lawOf(own).reach();
+    bodies_.visit(own, c, reach, [&](const TouchingSolid &) { near = true; });
+    if (const int before = bodies_.before(own); before >= 0 && !near) // samples on its skin that this edge carries, too
+      bodies_.visit(bodies_.pairs().items[std::size_t(before)], c, reach,
+                    [&](const TouchingSolid &t) { near = near || t.skin->point.edges == 2; });
     return near;
   }
   int timesBounded(RodSet rods) const override {
@@ -78,11 +82,17 @@ public:
         bool any = false;
         bodies_.visit(p, c, bodies_.lawOf(p).reach(), [&](const TouchingSolid &t) {
           any = true;
-          addNormal(p, t, c, kind, d);
+          if (t.skin)
+            addNormalOnSkin(p, t, c, kind, d, out);
+          else
+            addNormal(p, t, c, kind, d);
         });
         for (; sliding != end && sliding->pair.number == p.number; ++sliding) { // both lists are in one order
           any = true;
-          addFriction(*sliding, friction_.forceOn(*sliding, c), c, kind, d);
+          if (sliding->skin)
+            addFrictionOnSkin(*sliding, c, kind, d, out);
+          else
+            addFriction(*sliding, friction_.forceOn(*sliding, c), c, kind, d);
         }
         if (any) addPair(elements_, p, first_number_ + p.number, d, kind, out);
       }
@@ -100,6 +110,10 @@ public:
         const Vec3 arm = armTo(p, t, c);
         double closing = 0;
         for (const int side : {0, 1}) {
+          if (side == t.side && t.skin) {
+            closing += normal.dot(motionOf(t.skin->point, c, increment));
+            continue;
+          }
           const OfPair::BySide by = bySide(p, t, side, arm, c);
           for (int v = 0; v < (p.isBody(side) ? 6 : OfPair::half); ++v) {
             const auto [slot, a] = p.place(side, v);
@@ -176,6 +190,51 @@ private:
     d.hessian.middleRows<3>(other + 3) += turned.transpose();
   }
 
+  std::array<int, 2> numbersOf(const TouchingPair &p) const {
+    const int next = bodies_.next(p);
+    return {first_number_ + p.number, next < 0 ? -1 : first_number_ + next};
+  }
+  /// The same of a sample on the skin of a rod.
+  void addNormalOnSkin(const TouchingPair &p, const TouchingSolid &t, const Configuration &c, HessianKind kind,
+                       OfPair &d, Derivatives &out) const {
+    const int other = OfPair::half * t.solid();
+    const Mat3 q = bodies_.poseOf(p.body(t.solid()), c).rotation;
+    const Distance distance = bodies_.solidOf(p.body(t.solid())).at(t.local);
+    const GapLaw law = bodies_.lawOf(p)(t.gap);
+    const Vec3 normal = q * distance.gradient, g = t.weight * law.slope * normal, arm = armTo(p, t, c);
+    const bool exact = kind != HessianKind::gauss_newton;
+    OnSkinOfPair on{t.skin->point, g, t.weight * law.curvature * normal * normal.transpose(),
+                    bySide(p, t, t.solid(), arm, c)};
+    if (exact) {
+      on.hessian += t.weight * law.slope * (q * distance.hessian * q.transpose());
+      on.turned.middleCols<3>(3) = -crossMatrix<double>(g);
+    }
+    on.number = numbersOf(p);
+    addOnSkin(elements_, p, t.side, on, c, kind, out);
+    d.gradient.segment<OfPair::half>(other) += on.by_body.transpose() * g;
+    if (kind == HessianKind::none) return;
+    OfPair::BySide more = on.hessian * on.by_body;
+    Eigen::Matrix<double, OfPair::half, OfPair::half> own = on.by_body.transpose() * more;
+    if (exact) {
+      own.block<3, 3>(3, 3) += curvatureOfArm(g, arm);
+      own.block<3, 3>(0, 3) += crossMatrix<double>(g); // of its centre of mass and its spin
+      own.block<3, 3>(3, 0) += crossMatrix<double>(g).transpose();
+    }
+    d.hessian.block<OfPair::half, OfPair::half>(other, other) += own;
+  }
+  void addFrictionOnSkin(const SlidingPair &p, const Configuration &c, HessianKind kind, OfPair &d,
+                         Derivatives &out) const {
+    const int solid = 1 - p.side, other = OfPair::half * solid;
+    const SlidingForce force = friction_.forceOn(p, c);
+    OnSkinOfPair on{*p.skin, force.gradient, force.hessian, -byPoint(p.pair, solid, p.other, c)};
+    on.number = {first_number_ + p.pair.number, p.next};
+    addOnSkin(elements_, p.pair, p.side, on, c, kind, out);
+    d.gradient.segment<OfPair::half>(other) += on.by_body.transpose() * force.gradient;
+    if (kind == HessianKind::none) return;
+    addCurvature(p.pair, solid, p.other, -force.gradient, c, d);
+    d.hessian.block<OfPair::half, OfPair::half>(other, other) += on.by_body.transpose() * force.hessian * on.by_body;
+  }
+
   /// What touches at a configuration. The point is in the middle between both surfaces, or on the axis of a rod whose
   /// friction acts there.
   std::vector<SlidingPair> slidingPairs(const Configuration &c, int r) const {
@@ -189,11 +248,15 @@ private:
       SlidingPair p{pair, t.side, t.sample, bodies_.pointOf(pair, t), {}, {}};
       const bool on_axis = !pair.isBody(t.side) && (!bodies_.settingsOf(pair, t.side).friction_at_surface ||
                                                     scene_.rods[std::size_t(pair.rodOf(t.side))].material.isCable());
-      const double out = on_axis ? 0 : t.radius + 0.5 * t.gap;
+      const double out = on_axis || t.skin ? 0 : t.radius + 0.5 * t.gap;
       const std::size_t first = std::size_t(2 * t.side), to = std::size_t(2 * t.solid());
       const int frame = pair.isBody(t.side) ? pair.slot[first + 1] : pair.slot[first];
       p.own.arm -= out * (matrixOf(c.frameAt(frame)).transpose() * normal);
       p.other.arm = matrixOf(c.frameAt(pair.slot[to + 1])).transpose() * (armTo(pair, t, c) - out * normal);
+      if (t.skin) {
+        p.skin = t.skin->point;
+        p.next = numbersOf(pair)[1];
+      }
       p.point.pressing = pressing * steep.norm();
       p.point.normal = normal;
       friction_.complete(&p);

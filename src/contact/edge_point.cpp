@@ -33,16 +33,16 @@ std::array<ByEdge, 2> byEdges(const EdgePoint &point, const Configuration &c) {
 
 /// A force at the axis of an edge. A quadratic form A of its place is (1 - s) A(x_i) + s A(x_{i+1}) - s (1 - s)
 /// A(e_i): nothing that joins vertices.
-void addOnAxis(double at, int slot, const Vec3 &gradient, const Mat3 &hessian, const BlockPlanes *blocks,
+void addOnAxis(double at, int slot, int next, const Vec3 &gradient, const Mat3 &hessian, const BlockPlanes *blocks,
                Derivatives &out) {
   for (int a = 0; a < 3; ++a) {
     out.equilibrium[a][slot] += (1 - at) * gradient[a];
-    out.equilibrium[a][slot + 1] += at * gradient[a];
+    out.equilibrium[a][next] += at * gradient[a];
   }
   for (int a = 0; blocks && a < 3; ++a)
     for (int b = a; b < 3; ++b) {
       blocks->vertex(a, b)[slot] += (1 - at) * hessian(a, b);
-      blocks->vertex(a, b)[slot + 1] += at * hessian(a, b);
+      blocks->vertex(a, b)[next] += at * hessian(a, b);
       blocks->own(a, b)[slot] -= at * (1 - at) * hessian(a, b);
     }
 }
@@ -52,9 +52,9 @@ void addOnAxis(double at, int slot, const Vec3 &gradient, const Mat3 &hessian, c
 Vec3 placeOf(const EdgePoint &point, const Configuration &c) {
   Vec3 y = Vec3::Zero();
   for (std::size_t k = 0; k < std::size_t(point.edges); ++k) {
-    const auto &[slot, weight, carried] = point.by[k];
+    const auto &[slot, next, weight, carried] = point.by[k];
     const Vec3 from = c.positionAt(slot);
-    Vec3 own = from + carried.at * (c.positionAt(slot + 1) - from);
+    Vec3 own = from + carried.at * (c.positionAt(next) - from);
     if (!carried.arm.isZero(0)) own += turned(carried, c.frameAt(slot));
     y += weight * own;
   }
@@ -65,13 +65,13 @@ Vec3 motionOf(const EdgePoint &point, const Configuration &c, const Planes &incr
   const int slot = point.slot();
   if (point.isOnAxis())
     return (1 - point.by[0].point.at) * increment.vector(0, slot) +
-           point.by[0].point.at * increment.vector(0, slot + 1);
+           point.by[0].point.at * increment.vector(0, point.by[0].next);
   const std::array<ByEdge, 2> by = byEdges(point, c);
   Vec3 moved = increment.vector(0, slot);
   for (std::size_t k = 0; k < std::size_t(point.edges); ++k) {
     const int edge = point.by[k].slot;
     Eigen::Vector4d d;
-    d << increment.vector(0, edge + 1) - increment.vector(0, edge), increment[3][edge];
+    d << increment.vector(0, point.by[k].next) - increment.vector(0, edge), increment[3][edge];
     moved += by[k] * d;
   }
   return moved;
@@ -82,7 +82,7 @@ void spread(const EdgePoint &point, const Vec3 &value, const Configuration &c, P
   if (point.isOnAxis()) {
     for (int a = 0; a < 3; ++a) {
       out[a][slot] += (1 - point.by[0].point.at) * value[a];
-      out[a][slot + 1] += point.by[0].point.at * value[a];
+      out[a][point.by[0].next] += point.by[0].point.at * value[a];
     }
     return;
   }
@@ -93,7 +93,7 @@ void spread(const EdgePoint &point, const Vec3 &value, const Configuration &c, P
     const Eigen::Vector4d d = by[k].transpose() * value;
     for (int a = 0; a < 3; ++a) {
       out[a][edge] -= d[a];
-      out[a][edge + 1] += d[a];
+      out[a][point.by[k].next] += d[a];
     }
     out[3][edge] += d[3];
   }
@@ -101,7 +101,8 @@ void spread(const EdgePoint &point, const Vec3 &value, const Configuration &c, P
 
 void addAt(const EdgePoint &point, const Vec3 &gradient, const Mat3 &hessian, bool curved, const Configuration &c,
            const BlockPlanes *blocks, Derivatives &out) {
-  if (point.isOnAxis()) return addOnAxis(point.by[0].point.at, point.slot(), gradient, hessian, blocks, out);
+  if (point.isOnAxis())
+    return addOnAxis(point.by[0].point.at, point.slot(), point.by[0].next, gradient, hessian, blocks, out);
   spread(point, gradient, c, out.equilibrium);
   if (!blocks) return;
   const std::array<ByEdge, 2> by = byEdges(point, c);
@@ -109,7 +110,7 @@ void addAt(const EdgePoint &point, const Vec3 &gradient, const Mat3 &hessian, bo
   for (int a = 0; a < 3; ++a)
     for (int b = a; b < 3; ++b) blocks->vertex(a, b)[slot] += hessian(a, b);
   for (std::size_t k = 0; k < std::size_t(point.edges); ++k) {
-    const auto &[edge, weight, carried] = point.by[k];
+    const auto &[edge, next, weight, carried] = point.by[k];
     const ByEdge joined = hessian * by[k];
     Eigen::Matrix4d own = by[k].transpose() * joined;
     if (curved) {

@@ -1,7 +1,5 @@
 #include "tendril/contact/obstacles.hpp"
 
-#include "tendril/embedding/embedding.hpp"
-
 #include <algorithm>
 
 namespace tendril {
@@ -55,37 +53,7 @@ RodContacts::RodContacts(const Scene &scene, const Elements &elements, int rod)
     points_.push_back(samplePoints(settings_.quadrature, longest, sampleSpacing(*collider.shape, settings_)));
   for (const Collider &collider : scene.colliders) walls_.push_back(settings_.wall(*collider.shape));
   for (AlignedVector &x : seen_) x.assign(seenOf(chunks()) + lanes, 0.0);
-  if (settings_.on_surface) takeSkin(scene.rods[rod]);
-}
-
-void RodContacts::takeSkin(const Rod &rod) {
-  const Skin skin = skinOf(rod);
-  const double around = measureOf(rod, skin).area / elements_.length(index_);
-  first_of_chunk_.assign(chunks() + 1, 0);
-  int number = 0;
-  for (const SkinSample &s : skinSamples(rod, skin, settings_.quadrature, std::min(rod.skin->edges, 2))) {
-    OnSkin sample;
-    sample.point.edges = s.point.edges;
-    sample.weight = s.area / around;
-    const int first = s.point.edge[0];
-    number = !skin_.empty() && skin_.back().point.slot() == rod_.slot(first) ? number + 1 : 0;
-    sample.number = number;
-    double gain = 0;
-    for (int k = 0; k < s.point.edges; ++k) {
-      const Vec3 &local = s.point.local[k];
-      const int slot = rod_.slot(s.point.edge[k]);
-      const double at = 0.5 + local[0] / rod.edge(s.point.edge[k]).norm(),
-                   apart = s.point.edges == 2 ? std::abs(at - 1 + k) : std::min(std::abs(at), std::abs(1 - at));
-      sample.point.by[k] = {slot, s.point.weight[k], {at, {0, local[1], local[2]}}};
-      arm_ = std::max(arm_, std::hypot(local[1], local[2]));
-      apart_ = std::max(apart_, apart);
-      gain += s.point.weight[k] * (std::abs(1 - at) + std::abs(at));
-    }
-    gain_ = std::max(gain_, gain);
-    skin_.push_back(sample);
-    ++first_of_chunk_[first / chunk_edges + 1];
-  }
-  for (int k = 0; k < chunks(); ++k) first_of_chunk_[k + 1] += first_of_chunk_[k];
+  if (settings_.on_surface) skin_ = SkinSamples(scene.rods[rod], rod_);
 }
 
 double RodContacts::movedSince(const Configuration &c, int chunk) const {
@@ -100,7 +68,7 @@ double RodContacts::movedSince(const Configuration &c, int chunk) const {
     }
     most = max(most, count - i < lanes ? select(firstLanes(count - i), sum, Pack(0.0)) : sum);
   }
-  return gain_ * std::sqrt(hmax(most));
+  return skin_.gain() * std::sqrt(hmax(most));
 }
 
 void RodContacts::look(const Configuration &c, bool all) {
@@ -129,30 +97,52 @@ void RodContacts::look(const Configuration &c, bool all) {
       const double *const points[3] = {local[0].data(), local[1].data(), local[2].data()};
       scene_.colliders[k].shape->distances(points, count, distance.data());
       const double least = *std::min_element(distance.begin(), distance.begin() + count);
-      away_[chunk * colliders + k] = least - settings_.padding() - law_.reach() - apart_ * longest - arm_;
+      away_[chunk * colliders + k] = least - settings_.padding() - law_.reach() - skin_.apart() * longest - skin_.arm();
       nearest_[chunk] = std::min(nearest_[chunk], away_[chunk * colliders + k]);
     }
   }
 }
 
 void RodContacts::placeSamples(const Configuration &c, Samples &out) const {
+  const int begin = out.chunk * chunk_edges;
+  if (!skin_.empty()) return placeOnSkin(c, begin, out);
   const std::vector<SamplePoint> &points = points_[out.collider];
-  const int begin = out.chunk * chunk_edges, n = int(points.size());
+  const int n = int(points.size());
   for (int k = 0; k < out.count; ++k) {
-    Vec3 x;
-    if (skin_.empty()) {
-      out.slot[k] = rod_.slot(begin + (out.first + k) / n);
-      out.point[k] = (out.first + k) % n;
-      const Vec3 from = c.positionAt(out.slot[k]);
-      x = from + points[out.point[k]].at * (c.positionAt(out.slot[k] + 1) - from);
-    } else {
-      const OnSkin &sample = onSkin(out, k);
-      out.slot[k] = sample.point.slot();
-      out.point[k] = sample.number;
-      x = placeOf(sample.point, c);
+    out.slot[k] = rod_.slot(begin + (out.first + k) / n);
+    out.point[k] = (out.first + k) % n;
+    const Vec3 from = c.positionAt(out.slot[k]);
+    const Vec3 x = out.pose.toLocal(from + points[out.point[k]].at * (c.positionAt(out.slot[k] + 1) - from));
+    for (int a = 0; a < 3; ++a) out.local[a][k] = x[a];
+  }
+}
+
+/// Each edge goes to the axes of the obstacle once.
+void RodContacts::placeOnSkin(const Configuration &c, int begin, Samples &out) const {
+  struct Axes {
+    Vec3 from, along, director, second;
+  };
+  std::array<Axes, chunk_edges + 1> edges;
+  for (int i = 0; i < verticesOf(out.chunk) - 1; ++i) {
+    const int slot = rod_.slot(begin + i); // behind a ring a copy
+    const Frame frame = c.frameAt(slot);
+    const Mat3 turn = out.pose.rotation.transpose();
+    const Vec3 from = c.positionAt(slot);
+    edges[i] = {turn * (from - out.pose.position), turn * (c.positionAt(slot + 1) - from), turn * frame.director,
+                turn * frame.secondDirector()};
+  }
+  for (int k = 0; k < out.count; ++k) {
+    const EdgePoint &point = onSkin(out, k).point;
+    const int first = point.slot() - rod_.slot(begin);
+    Vec3 x = Vec3::Zero();
+    for (int j = 0; j < point.edges; ++j) {
+      const auto &[slot, next, weight, carried] = point.by[j];
+      const Axes &e = edges[first + j];
+      x += weight * (e.from + carried.at * e.along + carried.arm[1] * e.director + carried.arm[2] * e.second);
     }
-    const Vec3 local = out.pose.toLocal(x);
-    for (int a = 0; a < 3; ++a) out.local[a][k] = local[a];
+    out.slot[k] = point.slot();
+    out.point[k] = firstOnSkin(out.chunk) + out.first + k - skin_.first(begin + first);
+    for (int a = 0; a < 3; ++a) out.local[a][k] = x[a];
   }
 }
 

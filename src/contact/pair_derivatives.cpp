@@ -93,6 +93,27 @@ void addFriction(const SlidingPair &p, const SlidingForce &force, const Configur
   if (kind != HessianKind::none) out.hessian += by.transpose() * force.hessian * by;
 }
 
+void addOnSkin(const Elements &elements, const TouchingPair &p, int side, const OnSkinOfPair &on,
+               const Configuration &c, HessianKind kind, Derivatives &out) {
+  const RodRange &rod = elements.rods[std::size_t(p.rodOf(side))];
+  const BlockPlanes blocks(out.blocks, rod);
+  addAt(on.point, on.gradient, on.hessian, kind != HessianKind::gauss_newton, c,
+        kind == HessianKind::none ? nullptr : &blocks, out);
+  spread(on.point, on.gradient, c, out.gradient); // equilibrium has it
+  if (kind == HessianKind::none) return;
+  const OfPair::BySide by_body = on.hessian * on.by_body + on.turned;
+  for (std::size_t k = 0; k < std::size_t(on.point.edges); ++k) {
+    const EdgePoint::By &by = on.point.by[k];
+    TouchingPair own = p;
+    own.slot[std::size_t(2 * side)] = by.slot;
+    own.slot[std::size_t(2 * side + 1)] = by.next;
+    const Eigen::Matrix<double, half, half> between = by.weight * byPoint(own, side, by.point, c).transpose() * by_body;
+    double *const to = out.blocks.touching(on.number[k]);
+    for (int a = 0; a < half; ++a)
+      for (int b = 0; b < half; ++b) to[half * a + b] += side == 0 ? between(a, b) : between(b, a);
+  }
+}
+
 void addPair(const Elements &elements, const TouchingPair &p, int number, const OfPair &d, HessianKind kind,
              Derivatives &out) {
   for (const int side : {0, 1})

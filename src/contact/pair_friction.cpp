@@ -18,6 +18,13 @@ static const PairMemory *find(const std::vector<PairMemory> &memory, const Slidi
   return beside;
 }
 
+/// From the point of the other to that of the sample.
+static Vec3 wayOf(const SlidingPair &p, const Configuration &c) {
+  if (!p.skin) return wayBetween(p.pair, p.side, p.own, p.other, c);
+  const std::size_t to = std::size_t(2 - 2 * p.side); // of the body's position
+  return placeOf(*p.skin, c) - c.positionAt(p.pair.slot[to]) - armOf(p.pair, 1 - p.side, p.other, c);
+}
+
 void PairFriction::begin(const State &state, const Configuration &start, const Step &step) {
   start_ = &start;
   static_ = step.isStatic();
@@ -41,7 +48,7 @@ void PairFriction::complete(SlidingPair *p) const {
   SlidingPoint &point = p->point;
   p->both = &bothOf(p->pair);
   point.coefficient = p->both->friction;
-  point.start = wayBetween(p->pair, p->side, p->own, p->other, *start_);
+  point.start = wayOf(*p, *start_);
   const bool anchored = isAnchored(p->pair);
   if (!anchored && !holds(p->pair.rod)) return;
   const PairMemory *const found = find(of_[std::size_t(p->pair.rodOf(p->side))].before, *p);
@@ -51,8 +58,7 @@ void PairFriction::complete(SlidingPair *p) const {
 }
 
 SlidingForce PairFriction::forceOn(const SlidingPair &p, bool holds, const Configuration &c) const {
-  return slidingForce(p.point, *p.both, slidingOf(p, holds),
-                      wayBetween(p.pair, p.side, p.own, p.other, c) - p.point.start);
+  return slidingForce(p.point, *p.both, slidingOf(p, holds), wayOf(p, c) - p.point.start);
 }
 
 /// Where a point slides, its anchor follows within the fall-off. A rod has pairs with those before it, which have
@@ -66,7 +72,7 @@ void PairFriction::commit(State &state, const Configuration &c, int r) const {
     PairMemory m{p.pair.edgeOf(p.side), p.pair.rodOf(1 - p.side), p.pair.edgeOf(1 - p.side), p.sample,
                  Vec3::Zero(),          -forceOn(p, c).gradient};
     if (isAnchored(p.pair)) {
-      const Vec3 way = wayBetween(p.pair, p.side, p.own, p.other, c) - p.point.start,
+      const Vec3 way = wayOf(p, c) - p.point.start,
                  drawn = way - p.point.normal.dot(way) * p.point.normal + p.point.stick;
       m.stick = drawn * std::min(1.0, slidingOf(p, false).fall_off / std::max(drawn.norm(), 1e-300));
     }

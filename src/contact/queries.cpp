@@ -70,7 +70,7 @@ std::vector<Vec3> contactForces(const Elements &elements, const std::vector<Cont
     const RodRange &rod = elements.rods[reading.rod];
     const Vec3 both = reading.force + reading.friction;
     for (int k = 0; k < reading.point.edges; ++k) {
-      const auto &[slot, weight, carried] = reading.point.by[k];
+      const auto &[slot, next, weight, carried] = reading.point.by[k];
       const int edge = slot - rod.first_slot;
       force[rod.first_vertex + edge % rod.vertices] += weight * (1 - carried.at) * both;
       force[rod.first_vertex + (edge + 1) % rod.vertices] += weight * carried.at * both;

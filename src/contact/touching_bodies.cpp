@@ -29,8 +29,21 @@ TouchingBodies::TouchingBodies(const Scene &scene, const Elements &elements, boo
   for (int r = 0; r < int(scene.rods.size()); ++r)
     load_.push_back(
         scene.rods[std::size_t(r)].contact.touchesBodies() ? loadScale(scene, elements, r, elements.length(r)) : 0);
+  skins_.resize(scene.rods.size());
+  for (std::size_t r = 0; r < skins_.size(); ++r)
+    if (const Rod &rod = scene.rods[r]; rod.contact.on_surface && rod.contact.touchesBodies())
+      skins_[r] = SkinSamples(rod, elements.rods[r]);
   leaveOut();
   bearAsDrawn();
+}
+
+double TouchingBodies::aboutAxis(int r, const Configuration &c) const {
+  const SkinSamples &skin = skins_[std::size_t(r)];
+  if (skin.empty()) return scene_.rods[std::size_t(r)].contact.radius;
+  const RodRange &rod = elements_.rods[std::size_t(r)];
+  double longest = 0;
+  for (int s = rod.first_slot; s < rod.edgeEnd(); ++s) longest = std::max(longest, c[Configuration::length][s]);
+  return skin.arm() + skin.apart() * longest;
 }
 
 /// A rod that is tied to a body begins in it or at its surface.
@@ -101,6 +114,15 @@ TouchingBodies::Side TouchingBodies::sideOf(const TouchingPair &p, int side, con
     out.turned = pose.rotation.transpose() * c.rotationAt(next);
     return out;
   }
+  if (const SkinSamples &skin = skins_[std::size_t(p.rodOf(side))]; !skin.empty()) {
+    const std::span<const OnSkin> samples = skin.of(p.edgeOf(side));
+    out.skin = samples.data();
+    out.count = int(samples.size());
+    out.c = &c;
+    out.pose = pose;
+    out.along = pose.rotation.transpose() * c.edges<double>(slot);
+    return out;
+  }
   const std::span<const SamplePoint> points = points_of_[std::size_t(p.number)];
   out.points = points.data();
   out.count = int(points.size());
@@ -110,9 +132,9 @@ TouchingBodies::Side TouchingBodies::sideOf(const TouchingPair &p, int side, con
 }
 
 bool TouchingBodies::isAway(const TouchingPair &p, int side, const Side &samples, double reach) const {
-  const Vec3 middle = samples.points ? Vec3(samples.first + 0.5 * samples.along) : samples.first;
-  const double size =
-      samples.points ? 0.5 * samples.along.norm() + samples.radius : solids_[std::size_t(p.body(side))].reach;
+  const Vec3 middle = samples.samples ? samples.first : Vec3(samples.first + 0.5 * samples.along);
+  const double about = samples.skin ? aboutAxis(p.rodOf(side), *samples.c) : samples.radius,
+               size = samples.samples ? solids_[std::size_t(p.body(side))].reach : 0.5 * samples.along.norm() + about;
   return distanceAt(solidOf(p.body(1 - side)), middle) > size + reach;
 }
 
@@ -162,7 +184,8 @@ void TouchingBodies::find(const Configuration &start, const Planes &way, const S
 void TouchingBodies::addRooms(int r, std::vector<Box> &rooms) const {
   const ContactSettings &contact = scene_.rods[std::size_t(r)].contact;
   const RodRange &rod = elements_.rods[std::size_t(r)];
-  const double away = contact.radius + NormalLaw(contact, contact.stiffness).reach() + rod_room_[std::size_t(r)];
+  const double away = aboutAxis(r, start_) + NormalLaw(contact, contact.stiffness).reach() +
+                      skins_[std::size_t(r)].gain() * rod_room_[std::size_t(r)];
   Box room;
   for (int i = 0; i < rod.vertices; ++i) room.include(start_.positionAt(rod.slot(i)));
   if (contact.touchesBodies()) rooms.push_back(room.widened(away));
@@ -205,11 +228,13 @@ void TouchingBodies::take() const {
       const ContactSettings &contact = scene_.rods[std::size_t(r)].contact;
       if (!contact.touchesBodies()) continue;
       const RodRange &rod = elements_.rods[std::size_t(r)];
-      const double away = contact.radius + NormalLaw(contact, contact.stiffness).reach() + rod_room_[std::size_t(r)];
+      const double away = aboutAxis(r, c) + NormalLaw(contact, contact.stiffness).reach() +
+                          skins_[std::size_t(r)].gain() * rod_room_[std::size_t(r)];
       for (int i = 0; i < rod.edges; ++i) {
         const Vec3 along = c.edges<double>(rod.slot(i));
         if (isNear(c.positionAt(rod.slot(i)) + 0.5 * along, 0.5 * along.norm() + away) && mayTouch(r, i, b))
-          add(r, i, {rod.slot(i), rod.slot(i + 1)}, body.rod, TouchingPair::ofBody(b), {body.position, body.rotation});
+          add(r, i, {rod.slot(i), rod.slot((i + 1) % rod.vertices)}, body.rod, TouchingPair::ofBody(b),
+              {body.position, body.rotation});
       }
     }
     for (int other = 0; other < b; ++other) {
@@ -225,14 +250,28 @@ void TouchingBodies::take() const {
   pairs_.sort(scene_.rods.size());
   laws_.clear();
   points_of_.clear();
+  next_.clear();
+  before_.clear();
+  std::map<std::array<int, 3>, int> by_edge; // of a rod, with a body
   of_rod_.assign(scene_.rods.size(), {});
   for (TouchingPair &p : pairs_.items) {
     p.number = int(laws_.size());
     laws_.push_back(makeLaw(p));
     const int edge = p.isBody(0) ? 1 : 0;
+    next_.push_back(-1);
+    before_.push_back(-1);
+    if (!p.isOfBodies()) by_edge[{p.rodOf(edge), p.edgeOf(edge), p.body(1 - edge)}] = p.number;
     points_of_.push_back(p.isOfBodies() ? std::span<const SamplePoint>() : pointsFor(p.rodOf(edge), p.body(1 - edge)));
     of_rod_[std::size_t(p.rod)].push_back(p.number);
     if (p.to_rod != p.rod) of_rod_[std::size_t(p.to_rod)].push_back(p.number);
+  }
+  for (const auto &[key, number] : by_edge) {
+    const auto [r, edge, body] = key;
+    if (skins_[std::size_t(r)].empty()) continue;
+    const auto found = by_edge.find({r, (edge + 1) % elements_.rods[std::size_t(r)].vertices, body});
+    if (found == by_edge.end()) continue;
+    next_[std::size_t(number)] = found->second;
+    before_[std::size_t(found->second)] = number;
   }
 }
 
@@ -326,7 +365,9 @@ double TouchingBodies::freeFraction(const Configuration &from, const Configurati
       const int body = p.body(1 - side);
       const Side before = sideOf(p, side, poseOf(body, from), from), after = sideOf(p, side, poseOf(body, to), to);
       double longest = 0;
-      if (before.points)
+      if (before.skin)
+        longest = HUGE_VAL; // few are: their ways are looked at
+      else if (before.points)
         longest = std::max((after.first - before.first).norm(),
                            (after.first + after.along - before.first - before.along).norm());
       else

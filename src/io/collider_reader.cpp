@@ -168,8 +168,8 @@ void completeSurface(const YamlValue &block, Rod &rod) {
     block.fail(who + ", and is a cable, which has no frames that carry one; take 'on: surface' away");
   if (rod.skin->mesh && rod.skin->edges > 2)
     block.fail(who + ", whose points no more than two edges may carry; take 'edges: 2' for its mesh");
-  if (contact.touchesMoving())
-    block.fail(who + ", which meets obstacles so far; take 'rods' and 'bodies' out of its contact, or 'on: surface'");
+  if (contact.touchesRods())
+    block.fail(who + ", which meets obstacles and bodies, not rods; take 'rods' out of its contact, or 'on: surface'");
   if (contact.quadrature == 0) contact.quadrature = 3;
   if (contact.quadrature == 2) block.fail(who + ", which has 1, 3 or 6 points of a triangle for 'quadrature', not 2");
   if (!contact.friction_at_surface) block.fail(who + ", and 'friction_at: centreline' is for 'on: axis'");

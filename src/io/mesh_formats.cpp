@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::string_view spaces = " \t\r\n\v\f";
 
-std::string inQuotes(std::string_view word) { return excerpt(std::string(word)); }
+std::string quotedText(std::string_view word) { return excerpt(std::string(word)); }
 
 /// How a number is stored.
 struct NumberType {
@@ -67,15 +67,15 @@ Role roleOf(const std::string &element, const std::string &name) {
 const NumberType *typeOf(MeshLines &lines, std::string_view word) {
   for (const NumberType &type : number_types)
     if (word == type.name || word == type.other) return &type;
-  lines.fail(inQuotes(word) + " is not a type; write char, uchar, short, ushort, int, uint, float or double");
+  lines.fail(quotedText(word) + " is not a type; write char, uchar, short, ushort, int, uint, float or double");
 }
 
 void readFormat(MeshLines &lines, Header &header) {
   const std::string_view format = lines.word(), version = lines.word();
   if (!header.format.empty()) lines.fail("says its format twice; write one line 'format'");
   if (format != "ascii" && format != "binary_little_endian" && format != "binary_big_endian")
-    lines.fail(inQuotes(format) + " is not a format; write ascii, binary_little_endian or binary_big_endian");
-  if (version != "1.0") lines.fail(inQuotes(version) + " is not a version that is read; write 1.0");
+    lines.fail(quotedText(format) + " is not a format; write ascii, binary_little_endian or binary_big_endian");
+  if (version != "1.0") lines.fail(quotedText(version) + " is not a version that is read; write 1.0");
   header.format = format;
 }
 
@@ -84,7 +84,7 @@ void readElement(MeshLines &lines, Header &header) {
   if (name.empty()) lines.fail("an element has no name; write element NAME COUNT");
   if ((name == "vertex" || name == "face") && header.find(name))
     lines.fail("there is an element '" + name + "' above; write all of them as one");
-  header.elements.push_back({name, lines.count("rows of " + inQuotes(name)), {}});
+  header.elements.push_back({name, lines.count("rows of " + quotedText(name)), {}});
 }
 
 /// A role that is given twice, to a list of what is one number, or the other way round, is what no reader can follow.
@@ -140,8 +140,8 @@ Header readHeader(MeshLines &lines) {
     else if (word == "property")
       readProperty(lines, header);
     else if (word != "end_header")
-      lines.fail(inQuotes(word) + " is no word of a header; write format, element, property, comment or end_header");
-    if (lines.hasWords()) lines.fail("has more words than " + inQuotes(word) + " takes; leave them out");
+      lines.fail(quotedText(word) + " is no word of a header; write format, element, property, comment or end_header");
+    if (lines.hasWords()) lines.fail("has more words than " + quotedText(word) + " takes; leave them out");
     if (word == "end_header") return checkHeader(lines, header), header;
   }
   lines.failFile("ends within its header; write 'end_header' below it");
@@ -164,14 +164,14 @@ class TextNumbers : public Numbers {
 public:
   explicit TextNumbers(MeshLines &lines) : lines_(lines) {}
   void startRow(const Element &element, std::size_t row) override {
-    if (!lines_.next()) lines_.failCutOff("rows of " + inQuotes(element.name), row, element.count);
+    if (!lines_.next()) lines_.failCutOff("rows of " + quotedText(element.name), row, element.count);
   }
   double read(const NumberType &type) override {
     const std::string_view word = wordOf();
     const double x = numberOf(word, lines_);
     const double span = std::ldexp(1, 8 * type.bytes), lowest = type.kind == 'i' ? -span / 2 : 0;
     if (type.kind != 'f' && !(x >= lowest && x < lowest + span && x == std::floor(x)))
-      lines_.fail(inQuotes(word) + " is not of the type " + std::string(type.name));
+      lines_.fail(quotedText(word) + " is not of the type " + std::string(type.name));
     return x;
   }
   void skip(const NumberType &, std::size_t count) override {
@@ -216,13 +216,13 @@ public:
                       " bytes behind the last row that the header counts; correct its counts");
   }
   [[noreturn]] void fail(const std::string &message) const override {
-    lines_.failFile("row " + std::to_string(row_) + " of " + inQuotes(element_->name) + ": " + message);
+    lines_.failFile("row " + std::to_string(row_) + " of " + quotedText(element_->name) + ": " + message);
   }
 
 private:
   std::string_view take(std::size_t size) {
     if (lines_.text().size() - at_ < size)
-      lines_.failCutOff("rows of " + inQuotes(element_->name), row_, element_->count);
+      lines_.failCutOff("rows of " + quotedText(element_->name), row_, element_->count);
     at_ += size;
     return lines_.text().substr(at_ - size, size);
   }
@@ -254,7 +254,7 @@ void readRow(Numbers &in, const Element &element, std::size_t vertices, Polygons
   Vec3 x = Vec3::Zero();
   for (const Property &p : element.properties) {
     const double size = p.count ? in.read(*p.count) : 1;
-    if (size < 0) in.fail("the list " + inQuotes(p.name) + " has a length below 0");
+    if (size < 0) in.fail("the list " + quotedText(p.name) + " has a length below 0");
     if (p.role == Role::none)
       in.skip(*p.type, std::size_t(size));
     else if (p.role == Role::corners)
@@ -296,7 +296,7 @@ Vec3 MeshLines::point() {
     const std::string_view next = word();
     if (next.empty()) fail("expected three coordinates");
     x[k] = numberOf(next, *this);
-    if (!isCoordinate(x[k])) fail(inQuotes(next) + " is not a coordinate");
+    if (!isCoordinate(x[k])) fail(quotedText(next) + " is not a coordinate");
   }
   return x;
 }
@@ -306,7 +306,7 @@ std::size_t MeshLines::count(const std::string &what) {
   const auto count = wholeNumber(next);
   if (!count)
     fail(next.empty() ? "has no count of " + what + "; write how many there are"
-                      : inQuotes(next) + " is not a count of " + what + "; write a whole number, 0 or more");
+                      : quotedText(next) + " is not a count of " + what + "; write a whole number, 0 or more");
   if (*count > text_.size())
     fail("says that there are " + std::to_string(*count) + " " + what + ", and the file has " +
          std::to_string(text_.size()) + " bytes: is it cut off?");
@@ -328,7 +328,7 @@ double numberOf(std::string_view word, const MeshLines &lines) {
   const std::string text(word);
   char *end = nullptr;
   const double x = std::strtod(text.c_str(), &end); // std::stod refuses what is smaller than a normal double
-  if (text.empty() || end != text.c_str() + text.size()) lines.fail(inQuotes(word) + " is not a number");
+  if (text.empty() || end != text.c_str() + text.size()) lines.fail(quotedText(word) + " is not a number");
   return x;
 }
 
@@ -342,7 +342,7 @@ std::optional<std::uint64_t> wholeNumber(std::string_view word) {
 bool isCoordinate(double x) { return std::abs(x) <= 1e100; }
 
 std::string namesVertex(std::string_view word, std::size_t vertices) {
-  return "a face names vertex " + inQuotes(word) + ", and there are " + std::to_string(vertices) +
+  return "a face names vertex " + quotedText(word) + ", and there are " + std::to_string(vertices) +
          ", with numbers from 0";
 }
 

@@ -54,6 +54,12 @@ files = {
     "inside_out.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 4 2\nf 1 3 4\nf 2 4 3\n",
     "missing.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n",
     "points.obj": b"v 0 0 0\nv 1 0 0\n",
+    "plug.obj": b"v -0.1 -0.1 -0.1\nv 2 -0.1 -0.1\nv -0.1 2 -0.1\nv -0.1 -0.1 2\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n",
+    "two.json": b'{"position": [[0,0,0],[1,0,0],[0,1,0],[1,1,0]], "rod_vertex_offsets": [0, 2, 4]}',
+    "weighed.json": b'{"position": [[0,0,0],[1,0,0]]}',
+    "list.json": b"[[0, 0, 0], [1, 0, 0]]",
+    "weights.json": b'{"position": [[0,0,0],[1,0,0]], "skins": {"triangles": [[0,1,2]], "edge": [[0],[0],[0]],'
+                    b' "weight": [[1],[0.5],[1]], "local": [[[0,0,0]],[[0,1,0]],[[0,0,1]]]}}',
     "cut.stl": bytes(80) + (12).to_bytes(4, "little") + bytes(150),
     "facet.stl": b"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n",
     "text.h5": b"no HDF5\n",
@@ -117,6 +123,18 @@ def joints(text):
     """A free body and one that stays, with joints."""
     wall = "{name: wall, box: {size: [1, 1, 1]}, density: 1, position: [9, 9, 9], fixed: true}"
     return bodies(f"{cube}, {wall}", "", f"\njoints: [{text}]")
+
+
+def skin(text, more="", kind="radius: 0.01"):
+    """The rod with a skin, in a material whose section is of another kind; the skin is in line 7."""
+    return ("radius: 0.01, young: 1e7, poisson: 0.3, density: 1000}\n" + "supports:\n" + support,
+            f"{kind}, young: 1e7, poisson: 0.3, density: 1000}}\n    skin: {text}\nsupports:\n{support}{more}")
+
+
+def surface(text="{tube: {sides: 8}}", keys="", more=""):
+    """The rod touches a plane far below it by its skin; contact is in line 10, without a skin in line 9."""
+    floor = f"\ncontact: {{on: surface{keys}}}\ncolliders: [{{plane: {{}}, position: [0, -1, 0]}}]{more}"
+    return skin(text, floor) if text else (support, support + floor)
 
 
 cube = "{name: cube, box: {size: [0.2, 0.2, 0.2]}, density: 1000}"
@@ -236,6 +254,52 @@ rows = [
     ("contact of a rod by a number", ("density: 1000}\n" + "supports:\n" + support, "density: 1000}\n    contact: 3\nsupports:\n" + support), [], ["'contact'", "none"]),
     ("accuracy among obstacles", (support, support + "\ncolliders: [{plane: {}, position: [0, -1, 0]}]"), ["-mode", "static", "-accuracy", "1e-3"], ["-accuracy", "colliders"]),
     ("path among obstacles", (support, support + "\ncolliders: [{plane: {}, position: [0, -1, 0]}]"), ["-mode", "static", "-continuation", "arclength"], ["-continuation arclength", "colliders"]),
+    # skins of rods, and contact at them
+    ("skin of nothing", skin("{}"), [], ["scene.yaml:7", "a skin is a tube, a mesh, or both", "{tube: {sides: 12}}"]),
+    ("skin as a word", skin("tube"), [], ["scene.yaml:7", "'skin'"]),
+    ("misspelt key of a skin", skin("{tub: {sides: 8}}"), [], ["scene.yaml:7", "unknown key 'tub'", "did you mean 'tube'"]),
+    ("tube of two sides", skin("{tube: {sides: 2}}"), [], ["scene.yaml:7", "'sides' must lie in [3, 10000]", "'2'"]),
+    ("tube of half a side", skin("{tube: {sides: 3.5}}"), [], ["scene.yaml:7", "'sides' must be a whole number"]),
+    ("tube of no radius", skin("{tube: {radius: 0}}"), [], ["scene.yaml:7", "'radius' must be greater than zero"]),
+    ("tube of a negative radius", skin("{tube: {radius: -0.01}}"), [], ["scene.yaml:7", "'radius' must be greater than zero"]),
+    ("tube of no width", skin("{tube: {half_axes: [0.01, 0]}}"), [], ["scene.yaml:7", "'half_axes' must be greater than zero"]),
+    ("tube of a radius and half axes", skin("{tube: {radius: 0.01, half_axes: [0.01, 0.02]}}"), [], ["scene.yaml:7", "'radius' or 'half_axes', not both"]),
+    ("flat tube by natural frames", skin("{tube: {half_axes: [0.01, 0.02], frames: natural}}"), [], ["scene.yaml:7", "'frames: directors'"]),
+    ("tube of a strip by natural frames", skin("{tube: {frames: natural}}", kind="width: 0.01, height: 0.02"), [], ["scene.yaml:7", "'frames: directors'"]),
+    ("tube of no kind of frames", skin("{tube: {frames: bishop}}"), [], ["scene.yaml:7", "natural", "directors"]),
+    ("tube of no kind of area", skin("{tube: {area: more}}"), [], ["scene.yaml:7", "inscribed", "preserved"]),
+    ("tube of a rod without a section", ("radius: 0.01, young: 1e7, poisson: 0.3, density: 1000}", "linear_density: 0.1}\n    skin: {tube: {}}"), [], ["scene.yaml:7", "no section that tells the radius of its tube", "'radius'"]),
+    ("skin of no file", skin("{mesh: {file: none.obj}}"), [], ["none.obj", "cannot be opened"]),
+    ("skin of a mesh without a file", skin("{mesh: {scale: 2}}"), [], ["scene.yaml:7", "needs the key 'file'"]),
+    ("skin of another kind of file", skin("{mesh: {file: two.csv}}"), [], ["two.csv", ".obj, .off, .ply or .stl"]),
+    ("skin without triangles", skin("{mesh: {file: points.obj}}"), [], ["points.obj", "has no triangles"]),
+    ("skin of missing vertices", skin("{mesh: {file: missing.obj}}"), [], ["missing.obj:4", "there are 3"]),
+    ("skin of no scale", skin("{mesh: {file: plug.obj, scale: 0}}"), [], ["scene.yaml:7", "'scale' must be greater than zero"]),
+    ("skin carried by no edge", skin("{mesh: {file: plug.obj, edges: 0}}"), [], ["scene.yaml:7", "'edges' must lie in [1, 3]", "'0'"]),
+    ("skin carried by four edges", skin("{mesh: {file: plug.obj, edges: 4}}"), [], ["scene.yaml:7", "'edges' must lie in [1, 3]", "'4'"]),
+    ("one mesh for two rods", (shape, "file: two.json\n    skin: {mesh: {file: plug.obj}}"), [], ["scene.yaml:6", "a mesh goes with one rod, and the file has 2", "a file and a block for each"]),
+    ("shapes that are no object", (shape, "file: list.json"), [], ["scene.yaml:5", "list.json:1", "one JSON object"]),
+    ("shapes with weights that are none", (shape, "file: weights.json"), [], ["scene.yaml:5", "weights.json", "row 1 of 'skins/weight' sums to 0.5 and must sum to 1"]),
+    ("surface of a rod without a skin", surface(""), [], ["scene.yaml:", "rod 'a' touches by its surface, and has none", "skin: {tube: {sides: 12}}"]),
+    ("surface of a rod's own contact without a skin", ("density: 1000}\n" + "supports:\n" + support, "density: 1000}\n    contact: {on: surface}\nsupports:\n" + support + "\ncolliders: [{plane: {}, position: [0, -1, 0]}]"), [], ["scene.yaml:", "touches by its surface, and has none"]),
+    ("surface of no kind", (support, support + "\ncontact: {on: skin}\ncolliders: [{plane: {}, position: [0, -1, 0]}]"), [], ["scene.yaml:9", "axis", "surface"]),
+    ("surface of a cable", ("density: 1000}\n" + "supports:\n" + support, "density: 1000, flexural_stiffness: 0}\n    skin: {tube: {}}\nsupports:\n  - {vertex: 0, type: pin}\ncontact: {on: surface}\ncolliders: [{plane: {}, position: [0, -1, 0]}]"), [], ["scene.yaml:", "is a cable", "take 'on: surface' away"]),
+    ("surface by two points", surface(keys=", quadrature: 2"), [], ["scene.yaml:", "1, 3 or 6 points of a triangle for 'quadrature', not 2"]),
+    ("six points of an edge", (support, support + "\ncontact: {quadrature: 6}\ncolliders: [{plane: {}, position: [0, -1, 0]}]"), [], ["scene.yaml:", "6 points of a triangle for 'quadrature', which is for 'on: surface'"]),
+    ("surface that is open", surface("{mesh: {file: open.obj}}"), [], ["scene.yaml:", "rod 'a' touches by its surface", "edge"]),
+    ("surface that is inside out", surface("{mesh: {file: inside_out.obj}}"), [], ["scene.yaml:", "rod 'a' touches by its surface", "inside out"]),
+    ("surface carried by three edges", surface("{mesh: {file: plug.obj, edges: 3}}"), [], ["scene.yaml:", "take 'edges: 2' for its mesh"]),
+    ("surface that touches rods", surface(keys=", rods: all"), [], ["scene.yaml:", "take 'rods' and 'bodies' out"]),
+    ("surface that touches bodies", surface(keys=", bodies: true", more="\nbodies: [{name: ball, sphere: {radius: 0.05}, density: 100, position: [3, 0, 0]}]"), [], ["scene.yaml:", "take 'rods' and 'bodies' out"]),
+    ("surface with friction at the centreline", surface(keys=", friction: 0.3, friction_at: centreline"), [], ["scene.yaml:", "'friction_at: centreline' is for 'on: axis'"]),
+    ("surface with a radius", surface(keys=", radius: 0.02"), [], ["scene.yaml:", "'radius'"]),
+    ("surface in an obstacle", skin("{tube: {radius: 0.2}}", "\ncontact: {on: surface}\ncolliders: [{name: floor, plane: {}, position: [0, -0.1, 0]}]"), [], ["deep in collider 'floor'", "rod 'a'"]),
+    ("shapes to a file of another kind", None, ["-output_shapes", "shapes.obj"], ["option -output_shapes", "shapes.obj", ".h5, .hdf5 or .json"]),
+    ("shapes to no folder", None, ["-output_shapes", "nowhere/shapes.json"], ["option -output_shapes", "nowhere/shapes.json", "folder"]),
+    ("shapes in HDF5 to no folder", None, ["-output_shapes", "nowhere/shapes.h5"], ["option -output_shapes", "nowhere/shapes.h5", "folder"]),
+    ("shapes over a file that is read", (shape, "file: ./weighed.json"), ["-output_shapes", "weighed.json"], ["option -output_shapes", "'weighed.json' is read by this run", "another file"]),
+    ("shapes over the mesh of a skin", skin("{mesh: {file: plug.obj}}"), ["-output_shapes", "plug.obj"], ["option -output_shapes", "plug.obj"]),
+    ("shapes to a folder", None, ["-output_shapes", "."], ["option -output_shapes"]),
     ("pin to a vertex of no rod", (support, support + "\nconstraints: [{type: pin, vertex: 4, to: {rod: b, vertex: 0}, stiffness: 1}]"), [], ["scene.yaml:9", "'b'"]),
     ("pin to a vertex that is not there", (support, support + "\nconstraints: [{type: pin, vertex: 4, to: {vertex: 5}, stiffness: 1}]"), [], ["scene.yaml:9", "out of range", "0 to 4"]),
     ("pin to itself", (support, support + "\nconstraints: [{type: pin, vertex: 4, to: {vertex: last}, stiffness: 1}]"), [], ["scene.yaml:9", "both ends are vertex 4"]),

@@ -27,28 +27,41 @@ Rod touchingWire(const std::string &name, const Vec3 &from, const Vec3 &to, int 
 }
 
 /// A rod that lies within the barrier of a body of every shape, some of them beside another rod, and two bodies that
-/// touch each other.
-Scene pressedScene() {
+/// touch each other; and a ring that a ball touches where it closes. \param on_skin whether rods touch by tubes
+Scene pressedScene(bool on_skin = false) {
   Scene scene;
   scene.gravity = Vec3::Zero();
   const double r = 0.005;
   scene.rods = {touchingWire("a", Vec3(-0.1, 0, 0), Vec3(0.1, 0.01, 0), 9, r),
-                touchingWire("b", Vec3(-0.1, 1, 0), Vec3(0.1, 1, 0.02), 7, r)};
+                touchingWire("b", Vec3(-0.1, 1, 0), Vec3(0.1, 1, 0.02), 7, r),
+                touchingWire("ring", Vec3(-0.1, 2, 0), Vec3(0.1, 2, 0.02), 7, r)};
+  Rod &ring = scene.rods[2];
+  ring.position = ringShape(Vec3(0, 0.3, 0), Vec3(0, 0.1, 1).normalized(), 0.06, 14).points;
+  ring.closed = true;
+  setBishopDirectors(ring);
   scene.bodies = {touching("ball", "sphere", {0.03, 0, 0}, {0.012, 0.003, 0.0351}),
                   touching("crate", "box", {0.05, 0.04, 0.03}, {-0.05, 0.01, -0.0201}, {0.01, 0, 0.4}),
                   touching("bar", "capsule", {0.01, 0.1, 0}, {0.05, 0.005, -0.0149}, {1.5, 0.2, 0}),
                   touching("drum", "cylinder", {0.03, 0.05, 0}, {0.02, 1, -0.0241}, {0.1, 0.1, 0.1}),
                   touching("one", "box", {0.05, 0.05, 0.05}, {3, 0, 0}),
-                  touching("other", "box", {0.05, 0.05, 0.05}, {3.02, 0.01, 0.0502}, {0, 0, 0.3})};
+                  touching("other", "box", {0.05, 0.05, 0.05}, {3.02, 0.01, 0.0502}, {0, 0, 0.3}),
+                  touching("below", "sphere", {0.03, 0, 0},
+                           0.5 * (ring.position.front() + ring.position.back()) - Vec3(0.003, 0.004, 0.0344))};
   for (Rod &rod : scene.rods) {
     rod.contact.distance = r;
     rod.contact.stiffness = 100;
     rod.contact.friction = 0.3;
+    if (!on_skin) continue;
+    SkinRecipe recipe;
+    recipe.tube = {7, {r, r}, false, false};
+    rod.skin = std::make_shared<SkinRecipe>(recipe);
+    rod.contact.on_surface = true;
+    rod.contact.quadrature = 3;
   }
   for (Body &body : scene.bodies) {
     body.contact.stiffness = 10;
     body.contact.friction = 0.2;
-    body.rod = body.name == "drum" ? 1 : 0;
+    body.rod = body.name == "drum" ? 1 : body.name == "below" ? 2 : 0;
   }
   return scene;
 }
@@ -56,8 +69,8 @@ Scene pressedScene() {
 /// Derivatives of the term alone, whose energy is a potential. With friction the points slide by a part of the
 /// fall-off.
 TEST(ContactOfBodies, HasTheDerivativesOfItsEnergy) {
-  for (const bool slides : {false, true}) {
-    Scene scene = pressedScene();
+  for (const auto &[slides, on_skin] : {std::pair(false, false), {true, false}, {false, true}, {true, true}}) {
+    Scene scene = pressedScene(on_skin);
     for (Rod &rod : scene.rods) rod.contact.friction = slides ? 0.3 : 0;
     Simulation sim;
     EXPECT_PETSC(sim.setUp(scene, dynamics(0.01, 1)));
@@ -75,7 +88,7 @@ TEST(ContactOfBodies, HasTheDerivativesOfItsEnergy) {
     EXPECT_GE(pairs.size() - with_two_bodies, 5u);
     Derivatives d(sim.elements->slots, true);
     d.blocks.setTouching(pairs.size());
-    contact->addBetween(start, {0, 2}, d, HessianKind::exact);
+    contact->addBetween(start, {0, 3}, d, HessianKind::exact);
     sim.dofs.setTouching(pairs);
     Random random(5);
     for (int k = 0; k < 6; ++k) {
@@ -83,20 +96,23 @@ TEST(ContactOfBodies, HasTheDerivativesOfItsEnergy) {
       for (int s = 0; s < sim.dofs.slots(); ++s)
         for (int a = 0; a < slot_size; ++a)
           if (sim.dofs.unknown(s, a) >= 0) v[a][s] = (a == 3 ? 1 : 0.01) * random();
-      for (const JoinedBody &b : sim.elements->bodies({0, 2})) v.setVector(0, b.rotation, random.vector());
-      for (int r = 0; r < 2; ++r) d.blocks.multiply(sim.elements->rods[std::size_t(r)], sim.dofs.joins(r), v, kv);
+      for (const JoinedBody &b : sim.elements->bodies({0, 3})) v.setVector(0, b.rotation, random.vector());
+      Planes closed = v;
+      const RodRange &ring = sim.elements->rods[2];
+      closed.setVector(0, ring.slot(ring.vertices), v.vector(0, ring.first_slot));
+      for (int r = 0; r < 3; ++r) d.blocks.multiply(sim.elements->rods[std::size_t(r)], sim.dofs.joins(r), closed, kv);
       double slope = 0, curvature = 0, size = 0, moved = 0;
       for (int s = 0; s < sim.dofs.slots(); ++s)
         for (int a = 0; a < slot_size; ++a) {
           slope += v[a][s] * d.gradient[a][s];
-          curvature += v[a][s] * kv[a][s];
+          curvature += closed[a][s] * kv[a][s];
           size += d.gradient[a][s] * d.gradient[a][s];
           moved += v[a][s] * v[a][s];
         }
       auto energy = [&](double part) {
         Configuration trial;
-        EXPECT_TRUE(potential.tryMove(v, part, trial));
-        return contact->energy(trial, 0) + contact->energy(trial, 1);
+        EXPECT_TRUE(potential.tryMove(closed, part, trial));
+        return contact->energy(trial, 0) + contact->energy(trial, 1) + contact->energy(trial, 2);
       };
       constexpr double h = 1e-6; // the third derivative of friction jumps where nothing slides
       const double e[5] = {energy(-2 * h), energy(-h), energy(0), energy(h), energy(2 * h)};
@@ -104,7 +120,7 @@ TEST(ContactOfBodies, HasTheDerivativesOfItsEnergy) {
       EXPECT_NEAR((e[0] - 8 * e[1] + 8 * e[3] - e[4]) / (12 * h), slope, 1e-7 * std::sqrt(size * moved)) << k;
       EXPECT_NEAR((-e[0] + 16 * e[1] - 30 * e[2] + 16 * e[3] - e[4]) / (12 * h * h), curvature,
                   2e-4 * std::abs(curvature))
-          << k;
+          << k << " " << slides << " " << on_skin;
     }
   }
 }
@@ -112,9 +128,9 @@ TEST(ContactOfBodies, HasTheDerivativesOfItsEnergy) {
 /// What bodies and rods do to each other cancels: forces, and moments about any place. Where they have slid since the
 /// step began, the points where friction acts on both are so far apart, and no more.
 TEST(ContactOfBodies, LeavesMomentaAlone) {
-  for (const bool slid : {false, true}) {
+  for (const auto &[slid, on_skin] : {std::pair(false, false), {true, false}, {false, true}, {true, true}}) {
     Simulation sim;
-    EXPECT_PETSC(sim.setUp(pressedScene(), dynamics(0.01, 1)));
+    EXPECT_PETSC(sim.setUp(pressedScene(on_skin), dynamics(0.01, 1)));
     EXPECT_PETSC(sim.solver.begin(sim.state, TimeLoop::stepOf(dynamics(0.01, 1), sim.state, 0.01)));
     const std::unique_ptr<Term> contact = makeContactOfBodies(sim.scene, *sim.elements);
     const Configuration &start = sim.potential->start();
@@ -124,12 +140,12 @@ TEST(ContactOfBodies, LeavesMomentaAlone) {
     contact->findTouching(sim.state, start, sim.dofs.makePlanes(), step, 1, pairs);
     constexpr double way = 5e-5; // half of what friction needs to act in full
     Planes v = sim.dofs.makePlanes();
-    for (const JoinedBody &b : sim.elements->bodies({0, 2})) v.setVector(0, b.position, way * Vec3(1, 0.4, 0));
+    for (const JoinedBody &b : sim.elements->bodies({0, 3})) v.setVector(0, b.position, way * Vec3(1, 0.4, 0));
     Configuration c;
     ASSERT_TRUE(sim.potential->tryMove(v, slid ? 1 : 0, c));
     Derivatives d(sim.elements->slots, true);
     d.blocks.setTouching(pairs.size());
-    contact->addBetween(c, {0, 2}, d, HessianKind::none);
+    contact->addBetween(c, {0, 3}, d, HessianKind::none);
     Vec3 force = Vec3::Zero(), moment = Vec3::Zero();
     double size = 0, size_of_moment = 0;
     auto add = [&](const Vec3 &x, const Vec3 &f, const Vec3 &couple) {
@@ -145,11 +161,11 @@ TEST(ContactOfBodies, LeavesMomentaAlone) {
     for (int n = 0; n < sim.elements->edges(); ++n) // twists turn edges about themselves
       moment += d.gradient[3][sim.elements->edge_slot[std::size_t(n)]] *
                 c.frameAt(sim.elements->edge_slot[std::size_t(n)]).tangent;
-    for (const JoinedBody &b : sim.elements->bodies({0, 2}))
+    for (const JoinedBody &b : sim.elements->bodies({0, 3}))
       add(c.positionAt(b.position), d.gradient.vector(0, b.position), d.gradient.vector(0, b.rotation));
     EXPECT_GT(size, 1);
     EXPECT_LT(force.norm(), 1e-12 * size);
-    EXPECT_LT(moment.norm(), 1e-12 * size_of_moment + (slid ? 1.2 * way * size : 0));
+    EXPECT_LT(moment.norm(), 1e-12 * size_of_moment + (slid ? 1.2 * way * size : 0)) << on_skin;
   }
 }
 

@@ -41,6 +41,7 @@ EdgePoint randomPoint(Random &random, int edges, int first) {
   const double weight = 0.5 + 0.4 * random();
   for (std::size_t k = 0; k < std::size_t(edges); ++k)
     p.by[k] = {first + int(k),
+               first + int(k) + 1,
                edges == 1 ? 1.0
                : k == 0   ? weight
                           : 1 - weight,
@@ -322,6 +323,31 @@ TEST(SurfaceContact, ATubeRolls) {
   for (const double rate : sim.state.twist_rate) spin += rate / double(sim.state.twist_rate.size());
   for (const Vec3 &v : sim.state.velocity) way += v[1] / double(sim.state.velocity.size());
   EXPECT_NEAR(std::abs(spin) * rolls, way, 1e-3 * way);
+}
+
+/// Forces of 3 and 6 points a triangle on a tube pressed onto a ball differ by the square of the size of triangles.
+TEST(SurfaceContact, PointsOfATriangleAgreeToSecondOrder) {
+  std::vector<double> apart;
+  for (const int fine : {1, 2, 4}) {
+    double pressed[2];
+    for (const int points : {3, 6}) {
+      Scene scene = onPlane(0, 0, 0, 6 * fine);
+      Rod &rod = scene.rods[0];
+      rod.contact.law = ContactSettings::Law::penalty;
+      rod.contact.stiffness = 1e6;
+      rod.contact.threshold = 1e-3;
+      rod.contact.smoothing = 3e-3;
+      putTube(rod, 16 * fine, radius, points);
+      scene.colliders = {solid(makeSphere(0.2), Vec3(0.147, 0.0007, -0.197))};
+      Simulation sim;
+      EXPECT_PETSC(sim.setUp(scene, dynamics(1e-3, 1)));
+      pressed[points == 6] = actionOf(scene, sim)[0][2];
+    }
+    apart.push_back(std::abs(pressed[1] - pressed[0]) / pressed[1]);
+  }
+  EXPECT_LT(apart[0], 0.2);
+  EXPECT_GT(order(apart[0], apart[1]), 1.6);
+  EXPECT_GT(order(apart[1], apart[2]), 1.6);
 }
 
 /// The same ring, with its vertices counted from another one: what carries samples over the end is as all others.

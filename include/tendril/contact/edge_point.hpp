@@ -17,7 +17,7 @@ struct CarriedPoint {
 /// vertices x and vectors e.
 struct EdgePoint {
   struct By {
-    int slot; ///< of the edge
+    int slot, next; ///< of the edge, and of the vertex where it ends, of a ring the first
     double weight = 1;
     CarriedPoint point;
   };
@@ -25,7 +25,7 @@ struct EdgePoint {
   std::array<By, 2> by{};
 
   EdgePoint() = default;
-  EdgePoint(int slot, double at, const Vec3 &arm = Vec3::Zero()) : by{By{slot, 1, {at, arm}}, By{}} {}
+  EdgePoint(int slot, double at, const Vec3 &arm = Vec3::Zero()) : by{By{slot, slot + 1, 1, {at, arm}}, By{}} {}
   int slot() const { return by[0].slot; }
   /// Whether it is on the axis of one edge, whose frame does not matter.
   bool isOnAxis() const { return edges == 1 && by[0].point.arm.isZero(0); }

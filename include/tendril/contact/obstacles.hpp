@@ -3,8 +3,8 @@
 /// Samples of rods against the obstacles of a scene: where they are near, their distances, and how far a motion is
 /// free. docs/theory.md, Contact.
 
-#include "tendril/contact/edge_point.hpp"
 #include "tendril/contact/law.hpp"
+#include "tendril/contact/skin_samples.hpp"
 
 #include <algorithm>
 
@@ -96,12 +96,6 @@ public:
 
 private:
   static constexpr int chunk_edges = 16;
-  /// A sample on the skin.
-  struct OnSkin {
-    EdgePoint point;
-    int number;    ///< of those with its first edge
-    double weight; ///< its part of the rod at rest, as of all of the skin [m]
-  };
   const Scene &scene_;
   const Elements &elements_;
   const ContactSettings &settings_;
@@ -110,12 +104,8 @@ private:
   NormalLaw law_;
   std::vector<int> met_;                         ///< colliders that are there for the rod
   std::vector<std::vector<SamplePoint>> points_; ///< per collider
-  std::vector<OnSkin> skin_;                     ///< in the order of their first edges; empty: samples are on the axis
-  std::vector<int> first_of_chunk_;              ///< of them, per chunk, and the end
-  /// How far samples are at most from the vertices of a chunk: so much, and this part of its longest edge; and how much
-  /// faster they go.
-  double arm_ = 0, apart_ = 0.5, gain_ = 1;
-  std::vector<double> walls_;         ///< per collider: distance that no way passes [m]
+  SkinSamples skin_;                             ///< none where samples are on the axis
+  std::vector<double> walls_;                    ///< per collider: distance that no way passes [m]
   std::vector<double> away_;          ///< per chunk and collider: no sample reaches an obstacle that moves less [m]
   std::vector<double> nearest_;       ///< per chunk: the least of these
   std::array<AlignedVector, 3> seen_; ///< vertices of each chunk, with both of its ends, where they were then [m]
@@ -128,17 +118,18 @@ private:
   int verticesOf(int chunk) const {
     return edgesOf(chunk) + 1 + (!skin_.empty() && (rod_.closed || chunk + 1 < chunks()) ? 1 : 0);
   }
+  int firstOnSkin(int chunk) const { return skin_.first(chunk * chunk_edges); }
   int samplesIn(int chunk, int collider) const {
     return skin_.empty() ? edgesOf(chunk) * int(points_[collider].size())
-                         : first_of_chunk_[chunk + 1] - first_of_chunk_[chunk];
+                         : skin_.first(chunk * chunk_edges + edgesOf(chunk)) - firstOnSkin(chunk);
   }
   const OnSkin &onSkin(const Samples &samples, int k) const {
-    return skin_[first_of_chunk_[samples.chunk] + samples.first + k];
+    return skin_[firstOnSkin(samples.chunk) + samples.first + k];
   }
-  void takeSkin(const Rod &rod);
   double movedSince(const Configuration &c, int chunk) const;
   Samples samplesOf(const Configuration &c, int chunk, int collider, int first) const;
   void placeSamples(const Configuration &c, Samples &out) const;
+  void placeOnSkin(const Configuration &c, int begin, Samples &out) const;
 };
 
 template <class Visit>

@@ -4,6 +4,8 @@
 
 #include "tendril/contact/friction.hpp"
 
+#include <optional>
+
 namespace tendril {
 
 /// Over the variables of a pair (TouchingPair::place), those of the one first.
@@ -42,6 +44,8 @@ struct SlidingPair {
   CarriedPoint own, other; ///< of the sample's side; of the other
   SlidingPoint point;
   const ContactSettings *both = nullptr; ///< between its sides (bothSlide)
+  std::optional<EdgePoint> skin = {};    ///< in place of `own`, of a rod that touches by its skin
+  int next = -1;                         ///< number of the pair that the second edge of this has with the other
   SlidingPoint &slid() { return point; }
   bool isSame(const SlidingPair &b) const {
     return pair.number == b.pair.number && side == b.side && sample == b.sample;
@@ -50,6 +54,20 @@ struct SlidingPair {
 /// Adds derivatives of what friction does to it by the variables of the pair.
 void addFriction(const SlidingPair &p, const SlidingForce &force, const Configuration &c, HessianKind kind,
                  OfPair &out);
+
+/// What an energy by the place of a sample on the skin of a rod, relative to a body, does to both.
+struct OnSkinOfPair {
+  const EdgePoint &point;
+  Vec3 gradient; ///< by the place of the sample
+  Mat3 hessian;
+  OfPair::BySide by_body;                         ///< derivatives of that place, as the body sees it
+  OfPair::BySide turned = OfPair::BySide::Zero(); ///< second derivatives by the sample and the body's variables
+  std::array<int, 2> number{-1, -1};              ///< of the pairs that its edges have with the body
+};
+/// Adds the rod's own part to its blocks and gradients, and what it has with the body to the blocks of the pairs.
+/// \param kind whether there are any, and with the curvature of the skin
+void addOnSkin(const Elements &elements, const TouchingPair &pair, int side, const OnSkinOfPair &on,
+               const Configuration &c, HessianKind kind, Derivatives &out);
 
 /// Adds derivatives of a pair to both of the gradients and to the blocks: what each side has with itself goes to its
 /// own rod, of an edge by its first vertex, its vector and its twist, of a body to BodyPair; the rest to the block of

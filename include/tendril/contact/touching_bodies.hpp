@@ -12,12 +12,13 @@ namespace tendril {
 
 /// A sample of the one within the reach of the other, a body, as a solid.
 struct TouchingSolid {
-  int side, sample; ///< which of the pair has it (0, 1), and which of its samples
-  double at = 0;    ///< part of the edge
-  double weight;    ///< of an edge its part of the rod at rest [m]; of a body 1, or 1/2 where both have samples
-  double radius;    ///< about the sample [m]
-  double gap;       ///< between surfaces [m]
-  Vec3 local;       ///< in the axes of the solid
+  int side, sample;             ///< which of the pair has it (0, 1), and which of its samples
+  double at = 0;                ///< part of the edge
+  const OnSkin *skin = nullptr; ///< of a rod that touches by its skin
+  double weight; ///< of an edge its part of the rod at rest [m]; of a body 1, or 1/2 where both have samples
+  double radius; ///< about the sample [m]
+  double gap;    ///< between surfaces [m]
+  Vec3 local;    ///< in the axes of the solid
   int solid() const { return 1 - side; }
 };
 
@@ -57,6 +58,9 @@ public:
   CarriedPoint pointOf(const TouchingPair &p, const TouchingSolid &t) const {
     return {t.at, p.isBody(t.side) ? samplesOf(p.body(t.side))[std::size_t(t.sample)].arm : Vec3(Vec3::Zero())};
   }
+  /// Of the pair that the edge behind that of a pair has with the same body; -1 where there is none.
+  int next(const TouchingPair &p) const { return next_[std::size_t(p.number)]; }
+  int before(const TouchingPair &p) const { return before_[std::size_t(p.number)]; } ///< that of the edge before
   const Shape &solidOf(int body) const { return *solids_[std::size_t(body)].shape; }
 
   /// Calls visit(sample) for those of a pair within reach.
@@ -88,12 +92,18 @@ private:
     int count;
     const SamplePoint *points; ///< of an edge, or null
     const BodySample *samples;
+    const OnSkin *skin; ///< of an edge, or null
+    const Configuration *c;
+    Collider::Pose pose;
     double radius; ///< of an edge
     Vec3 first;    ///< vertex of an edge, or centre of mass
     Vec3 along;    ///< the edge
     Mat3 turned;   ///< of the body
-    Vec3 at(int k) const { return points ? Vec3(first + points[k].at * along) : Vec3(first + turned * samples[k].arm); }
-    double radiusAt(int k) const { return points ? radius : samples[k].radius; }
+    Vec3 at(int k) const {
+      if (skin) return pose.toLocal(placeOf(skin[k].point, *c));
+      return points ? Vec3(first + points[k].at * along) : Vec3(first + turned * samples[k].arm);
+    }
+    double radiusAt(int k) const { return samples ? samples[k].radius : radius; }
   };
   const Scene &scene_;
   const Elements &elements_;
@@ -112,9 +122,13 @@ private:
   mutable ByRod<TouchingPair> pairs_;
   mutable std::vector<NormalLaw> laws_;                         ///< per pair
   mutable std::vector<std::span<const SamplePoint>> points_of_; ///< per pair: of its edge
+  mutable std::vector<int> next_, before_;                      ///< per pair, see next
   mutable std::vector<std::vector<int>> of_rod_;
   mutable std::vector<int> bounded_; ///< per rod
 
+  std::vector<SkinSamples> skins_; ///< per rod
+  /// How far samples of a rod are at most from the middle of their edge, beyond half of it [m].
+  double aboutAxis(int rod, const Configuration &c) const;
   const std::vector<BodySample> &samplesOf(int body) const { return solids_[std::size_t(body)].samples; }
   Side sideOf(const TouchingPair &p, int side, const Collider::Pose &pose, const Configuration &c) const;
   /// Whether none of it is within reach of the other.
@@ -160,7 +174,12 @@ void TouchingBodies::visit(const TouchingPair &p, const Configuration &c, double
         t.gap = distance[here] - t.radius;
         if (!(t.gap < reach)) continue;
         t.weight = 0.5; // of a body, for the other has samples, too
-        if (samples.points) {
+        if (samples.skin) {
+          t.skin = samples.skin + t.sample;
+          if (t.skin->point.edges == 2 && next(p) < 0) continue; // its other edge does not touch this body
+          t.at = t.skin->point.by[0].point.at;
+          t.weight = t.skin->weight;
+        } else if (samples.points) {
           t.at = samples.points[t.sample].at;
           t.weight = samples.points[t.sample].weight * elements_.restLength()[p.slot[std::size_t(2 * side)]];
         }
