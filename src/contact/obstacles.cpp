@@ -19,7 +19,8 @@ std::vector<SamplePoint> samplePoints(int quadrature, double longest_edge, doubl
 }
 
 double sampleSpacing(const Shape &shape, const ContactSettings &contact) {
-  const double reach = NormalLaw(contact, contact.stiffness).reach();
+  const NormalLaw law(contact, contact.stiffness);
+  const double reach = law.reach() > 0 ? law.reach() : contact.smoothing; // of a penalty that begins inside
   return 0.56 * std::sqrt(2 * (shape.curvatureRadius() + contact.radius) * 2 * reach);
 }
 

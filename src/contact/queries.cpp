@@ -17,8 +17,11 @@ double barrierStiffness(const Scene &scene, const Elements &elements, double for
                         int r) {
   const Rod &rod = scene.rods[r];
   const double length = elements.length(r);
-  double wanted = std::max(force / (20 * rod.contact.radius), 0.1 * pressure);
-  if (rod.gravity) wanted = std::max(wanted, 10 * rod.material.linear_density * scene.gravity.norm());
+  // Of a skin a strip bears all, as wide as that of a tube within the barrier of a plane.
+  const double strip =
+      rod.contact.on_surface ? std::max(1.0, pi * std::sqrt(rod.contact.radius / (2 * rod.contact.distance))) : 1;
+  double wanted = std::max(strip * force / (20 * rod.contact.radius), 0.1 * pressure);
+  if (rod.gravity) wanted = std::max(wanted, 10 * strip * rod.material.linear_density * scene.gravity.norm());
   // What bends it by its own length: where nothing pulls, and in statics, where supports press it as its bending asks.
   const auto [k1, k2] = rod.material.flexural_stiffness;
   const double cube = length * length * length;

@@ -227,6 +227,7 @@ SkinMeasure measureOf(const Rod &rod, const Skin &skin) {
     const Vec3 from = x[std::size_t(a)] - x[0], to = x[std::size_t(b)] - x[0], last = x[std::size_t(c)] - x[0];
     sum.area += 0.5 * (to - from).cross(last - from).norm();
     sum.volume += from.dot(to.cross(last)) / 6;
+    sum.side = std::max({sum.side, (to - from).norm(), (last - to).norm(), (from - last).norm()});
   }
   return sum;
 }
@@ -241,10 +242,9 @@ double widestTurn(const Rod &rod, const Skin &skin) {
   return std::acos(std::clamp(least, -1.0, 1.0));
 }
 
-double farthestOverMedian(const Rod &rod, const Skin &skin) {
-  const Nearest nearest(rod);
+double farthestOverMedian(const Skin &skin) {
   std::vector<double> away;
-  for (const Vec3 &y : placesOf(rod, skin)) away.push_back(std::sqrt(nearest.on(y).squared));
+  for (const SkinPoint &p : skin.points) away.push_back(p.local[0].tail<2>().norm());
   if (away.empty()) return 0;
   const auto middle = away.begin() + std::ptrdiff_t(away.size() / 2);
   const double most = *std::max_element(away.begin(), away.end());

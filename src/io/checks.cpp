@@ -4,6 +4,7 @@
 #include "tendril/contact/touching_bodies.hpp"
 #include "tendril/contact/touching_rods.hpp"
 #include "tendril/dynamics/arc_length.hpp"
+#include "tendril/embedding/embedding.hpp"
 #include "tendril/io/text.hpp"
 
 #include <algorithm>
@@ -248,12 +249,19 @@ std::vector<std::string> notesOnContact(const Simulation &run) {
           shortText(contact.distance) + " m wants " + shortText(wanted) +
           " m: other rods may stop between them; take shorter edges or a larger 'contact: {distance: ...}'");
     if (contact.quadrature == 0) continue;
-    const double apart = edge / (contact.on_surface ? 2 : contact.quadrature);
+    const double apart = contact.on_surface ? measureOf(run.scene.rods[r], skinOf(run.scene.rods[r])).side /
+                                                  std::sqrt(contact.quadrature) // as many points along a side, about
+                                            : edge / contact.quadrature;
     for (const Collider &c : run.scene.colliders)
       if (const double across = 2 * (c.shape->depth() + contact.padding()); apart > across)
         notes.push_back("warning: rod '" + run.scene.rods[r].name + "' touches by points up to " + shortText(apart) +
                         " m apart and may miss collider '" + c.name + "', with it " + shortText(across) +
-                        " m across: take " + (contact.on_surface ? "" : "'quadrature: auto' or ") + "shorter edges");
+                        " m across: take " + (contact.on_surface ? "smaller triangles" : "'quadrature: auto'") +
+                        " or shorter edges");
+      else if (const double wanted = sampleSpacing(*c.shape, contact); contact.on_surface && apart > 2 * wanted)
+        notes.push_back("warning: rod '" + run.scene.rods[r].name + "' touches by points up to " + shortText(apart) +
+                        " m apart, where collider '" + c.name + "' asks for " + shortText(wanted) +
+                        " m: it may sink in between; take smaller triangles, shorter edges or a larger 'distance'");
   }
   return notes;
 }

@@ -159,6 +159,23 @@ void readSettings(YamlMap &map, const ContactKeys &keys, ContactSettings &out) {
   map.finish();
 }
 
+/// Of what a rod with a skin may touch, that whose middle is least deep; points of a skin have nothing about them that
+/// could not follow through.
+std::pair<std::string, double> thinnest(const Scene &scene, const ContactSettings &contact) {
+  std::pair<std::string, double> least{"", HUGE_VAL};
+  if (!contact.on_surface) return least;
+  auto take = [&](const std::string &name, double depth) {
+    if (depth < least.second) least = {name, depth};
+  };
+  for (int k = 0; k < int(scene.colliders.size()); ++k)
+    if (std::find(contact.passes.begin(), contact.passes.end(), k) == contact.passes.end())
+      take("collider '" + scene.colliders[k].name + "'", scene.colliders[k].shape->depth());
+  for (const Body &body : scene.bodies)
+    if (contact.touchesBodies() && body.contact.touchesBodies() && body.solid)
+      take("body '" + body.name + "'", body.solid->depth());
+  return least;
+}
+
 /// What a rod needs that touches by its skin; its penalty is per area as written.
 void completeSurface(const YamlValue &block, Rod &rod) {
   ContactSettings &contact = rod.contact;
@@ -167,9 +184,8 @@ void completeSurface(const YamlValue &block, Rod &rod) {
   if (rod.material.isCable())
     block.fail(who + ", and is a cable, which has no frames that carry one; take 'on: surface' away");
   if (rod.skin->mesh && rod.skin->edges > 2)
-    block.fail(who + ", whose points no more than two edges may carry; take 'edges: 2' for its mesh");
-  if (contact.touchesRods())
-    block.fail(who + ", which meets obstacles and bodies, not rods; take 'rods' out of its contact, or 'on: surface'");
+    block.fail(who +
+               ", whose points no more than two edges may carry; take 'edges: 2' for its mesh, or a file with two");
   if (contact.quadrature == 0) contact.quadrature = 3;
   if (contact.quadrature == 2) block.fail(who + ", which has 1, 3 or 6 points of a triangle for 'quadrature', not 2");
   if (!contact.friction_at_surface) block.fail(who + ", and 'friction_at: centreline' is for 'on: axis'");
@@ -182,7 +198,7 @@ void completeSurface(const YamlValue &block, Rod &rod) {
   const double around = measureOf(rod, skin).area / rod.length(); // mean of its perimeter
   if (!contact.isBarrier() && contact.stiffness == 0) contact.stiffness = 1e9;
   contact.stiffness *= around;
-  contact.radius = around / (2 * pi);
+  if (std::isnan(contact.radius)) contact.radius = around / (2 * pi); // for rods, and the width of its law
 }
 
 } // namespace
@@ -298,7 +314,12 @@ void completeContact(const YamlValue &block, const Overrides &overrides, Scene &
       block.fail("rod '" + rod.name + "' touches rods, and needs a contact radius above 0 for it");
     if (contact.point_cloud && contact.isBarrier())
       block.fail("rod '" + rod.name + "' is a point cloud, for which there is only 'law: penalty'");
-    if (std::isnan(contact.distance)) contact.distance = 0.2 * contact.radius;
+    if (std::isnan(contact.distance))
+      contact.distance = std::min(0.2 * contact.radius, thinnest(scene, contact).second);
+    if (const auto [name, depth] = thinnest(scene, contact); contact.isBarrier() && contact.distance > depth)
+      block.fail("rod '" + rod.name + "': the 'distance' of its contact, " + shortText(contact.distance) +
+                 " m, must not exceed the depth of " + name + ", " + shortText(depth) +
+                 " m, or points of its skin would pass it");
     if (contact.isBarrier() && contact.distance > contact.radius)
       block.fail("rod '" + rod.name + "': the 'distance' of its contact, " + shortText(contact.distance) +
                  " m, must not exceed its radius, " + shortText(contact.radius) + " m");

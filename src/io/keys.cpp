@@ -168,7 +168,7 @@ std::string rulesOf(std::string_view block) {
     return R"("oneOf": [{"required": ["plane"]}, {"required": ["sphere"]}, {"required": ["capsule"]}, {"required": ["cylinder"]}, {"required": ["box"]}, {"required": ["tube"]}, {"required": ["mesh"]}])";
   if (block == "loads[]")
     return R"("oneOf": [
- {"required": ["vertex", "force"], "not": {"anyOf": [{"required": ["edge"]}, {"required": ["torque"]}, {"required": ["moment"]}]}},
+ {"required": ["vertex"], "anyOf": [{"required": ["force"]}, {"required": ["mass"]}], "not": {"anyOf": [{"required": ["edge"]}, {"required": ["torque"]}, {"required": ["moment"]}]}},
  {"required": ["edge"], "anyOf": [{"required": ["torque"]}, {"required": ["moment"]}],
   "not": {"anyOf": [{"required": ["vertex"]}, {"required": ["force"]}]}}])";
   return {};

@@ -139,4 +139,11 @@ std::string OutputFolder::setAside(const std::string &checkpoint) const {
   return part + "/checkpoint.h5";
 }
 
+void OutputFolder::refuseToReplace(const std::vector<std::string> &inputs) const {
+  for (const std::string &input : inputs)
+    if (replaces(input))
+      throw SceneError("option -output_dir: results would replace '" + input +
+                       "', which this run reads; choose another folder, or another name for that file");
+}
+
 } // namespace tendril

@@ -2,6 +2,7 @@
 
 #include "tendril/io/checks.hpp"
 #include "tendril/io/quiet_errors.hpp"
+#include "tendril/io/text.hpp"
 #include "tendril/solver/activity.hpp"
 #include "tendril/solver/events.hpp"
 

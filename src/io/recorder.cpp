@@ -5,7 +5,6 @@
 #include "tendril/io/text.hpp"
 #include "tendril/solver/events.hpp"
 
-#include <filesystem>
 #include <iomanip>
 #include <sstream>
 #include <sys/resource.h>
@@ -19,25 +18,13 @@ Recorder::Recorder(const Options &options, const Prepared &prepared, const StepC
       arclength_(!options.loop.dynamic && options.loop.continuation == Continuation::arclength), widest_{pi / 6} {
   if (const double interval = options.output_interval; interval > 0)
     next_output_ = interval * (1 + std::floor(run_.state.time / interval * (1 + 1e-12)));
-  if (leads() && !options.output_shapes.empty()) writeShapesOf(prepared);
+  if (leads() && !options.output_shapes.empty()) writeShapes(options.output_shapes, run_.scene);
   if (leads())
     trajectory_ = std::make_unique<TrajectoryWriter>(options.output_dir, run_.scene, *run_.elements, origin,
                                                      options.fields, options.loop.dynamic);
   writeFrame(run_.state);
   if (leads()) trajectory_->flushWhenDue();
   widest_.rod = -1; // told at the start
-}
-
-void Recorder::writeShapesOf(const Prepared &prepared) const {
-  const std::string &path = options_.output_shapes;
-  for (const std::string &input : prepared.source.paths)
-    if (std::error_code error; std::filesystem::equivalent(path, input, error))
-      throw SceneError("option -output_shapes: '" + path + "' is read by this run; choose another file");
-  try {
-    writeShapes(path, run_.scene);
-  } catch (const SceneError &e) {
-    throw SceneError(std::string("option -output_shapes: ") + e.what());
-  }
 }
 
 void Recorder::writeFrame(const State &whole) {

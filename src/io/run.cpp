@@ -12,6 +12,7 @@
 #include "tendril/io/provenance.hpp"
 #include "tendril/io/quiet_errors.hpp"
 #include "tendril/io/recorder.hpp"
+#include "tendril/io/shape_file.hpp"
 #include "tendril/io/stop.hpp"
 #include "tendril/io/take_up.hpp"
 #include "tendril/io/text.hpp"
@@ -90,16 +91,6 @@ void readCommandLine(int argc, char **argv, const OptionFiles &files, Options *o
   if (const std::string place = files.place("scene"); !place.empty() && !std::filesystem::exists(o->scene))
     throw SceneError(place + ": the scene '" + o->scene +
                      "' cannot be opened; its path begins in the folder where tendril is started");
-}
-
-/// \throws SceneError where a result would take the place of a file that the run reads.
-void refuseToReplaceInputs(const OutputFolder &folder, const OptionFiles &files, const SceneSource &source) {
-  std::vector<std::string> inputs = files.files();
-  inputs.insert(inputs.end(), source.paths.begin(), source.paths.end());
-  for (const std::string &input : inputs)
-    if (folder.replaces(input))
-      throw SceneError("option -output_dir: results would replace '" + input +
-                       "', which this run reads; choose another folder, or another name for that file");
 }
 
 /// What a restart asks of the run that it goes on with.
@@ -278,7 +269,10 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
     if (!unknown.empty()) refuseUnused(unknown);
     if (!world.leads()) return;
     begun.folder.emplace(o.output_dir);
-    refuseToReplaceInputs(*begun.folder, files, prepared.source);
+    std::vector<std::string> inputs = files.files();
+    inputs.insert(inputs.end(), prepared.source.paths.begin(), prepared.source.paths.end());
+    begun.folder->refuseToReplace(inputs);
+    checkShapesPath(o.output_shapes, inputs, o.output_dir);
   });
   if (o.accuracy) meetAccuracy(prepared, o, &begun.choice);
   const StopRequest request(start, o.time_limit, world.leads()); // before, nothing is written: a signal ends at once

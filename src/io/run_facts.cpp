@@ -1,5 +1,6 @@
 #include "tendril/io/run_facts.hpp"
 
+#include "tendril/embedding/embedding.hpp"
 #include "tendril/io/digest.hpp"
 #include "tendril/io/text.hpp"
 
@@ -92,7 +93,7 @@ std::string textOf(const ContactSettings &c) {
          (!c.touchesRods()                       ? ""
           : c.rods == ContactSettings::Rods::all ? ", with all rods"
                                                  : ", with other rods") +
-         (c.touchesBodies() ? ", with bodies" : "") +
+         (c.touchesBodies() ? ", with bodies" : "") + (c.on_surface ? ", on its skin" : "") +
          (c.point_cloud ? ", cloud of " + std::to_string(c.cloud) + " apart by " + textOf(c.exclusion_ratio) : "") +
          (c.apart_from | c.apart_to
               ? ", apart by " + std::to_string(c.apart_from) + " and " + std::to_string(c.apart_to)
@@ -298,6 +299,18 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
   for (const Rod &rod : scene.rods)
     if (!scene.colliders.empty() || rod.contact.touchesMoving())
       add(Kind::scene, "contact of rod '" + rod.name + "'", textOf(rod.contact));
+  for (const Rod &rod : scene.rods) {
+    if (!rod.skin) continue;
+    Digest skin;
+    const Skin all = skinOf(rod);
+    for (const SkinPoint &p : all.points) {
+      skin.add(p.edge.data(), sizeof p.edge);
+      skin.add(p.weight.data(), sizeof p.weight);
+      skin.add(p.local.data(), sizeof p.local);
+    }
+    skin.add(all.triangles.data(), all.triangles.size() * sizeof all.triangles[0]);
+    add(Kind::scene, "skin of rod '" + rod.name + "'", "#" + skin.hex());
+  }
   for (const NodalForce &f : scene.forces)
     if (f.mass > 0) add(Kind::scene, at("mass on vertex ", f.vertex, f.rod), textOf(f.mass));
   for (const NodalForce &f : scene.forces) add(Kind::load, at("force on vertex ", f.vertex, f.rod), textOf(f.force));

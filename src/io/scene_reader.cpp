@@ -279,6 +279,16 @@ std::string contentOf(const std::filesystem::path &path, const std::string &mist
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
+/// The meshes of things that have some, or their skins.
+void keepMeshes(const YamlValue &things, SceneSource &source) {
+  for (const YamlValue &thing : things.items()) {
+    const YAML::Node node = thing.node(); // of a constant node [] makes nothing
+    const YAML::Node skin = node["skin"], holder = skin && skin.IsMap() ? skin : node, mesh = holder["mesh"];
+    if (mesh && mesh.IsMap() && mesh["file"])
+      source.paths.push_back((std::filesystem::path(things.file()).parent_path() / mesh["file"].Scalar()).string());
+  }
+}
+
 /// The polyline files of the rods; HDF5 files are no text.
 void keepFiles(const YamlValue &rods, SceneSource &source) {
   for (const YamlValue &rod : rods.items()) {
@@ -338,8 +348,13 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
     for (const YamlValue &v : map.at("loads").items()) readLoad(v, out);
   if (map.has("colliders"))
     for (const YamlValue &v : map.at("colliders").items()) readCollider(v, out.scene);
+  readIgnored(map, out);
   const bool touches = !out.scene.colliders.empty() || out.scene.touchesMoving();
-  if (touches) completeContact(map.has("colliders") ? map.at("colliders") : map.at("rods"), overrides, out.scene);
+  if (touches)
+    completeContact(map.at(map.has("contact")     ? AnyKey("contact")
+                           : map.has("colliders") ? AnyKey("colliders")
+                                                  : AnyKey("rods")),
+                    overrides, out.scene);
   if (map.has("contact") && !touches)
     map.at("contact").fail("'contact' has nothing to act on: rods touch 'colliders', each other with 'contact: {rods: "
                            "all}', and bodies with 'contact: {bodies: true}'; add one of these, or take it away");
@@ -348,7 +363,6 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
       throw SceneError("option -" + name +
                        ": the scene has no 'colliders' that rods could touch, nor do they touch each other ('contact: "
                        "{rods: all}') or bodies ('contact: {bodies: true}')");
-  readIgnored(map, out);
   const auto feels = [](const auto &of) { return of.contact.touchesBodies(); };
   for (const Body &body : out.scene.held_bodies)
     if (feels(body) && (std::any_of(out.scene.rods.begin(), out.scene.rods.end(), feels) ||
@@ -360,6 +374,9 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
   out.scene.hostBodies();
   out.source.paths = {path};
   keepFiles(map.at("rods"), out.source);
+  keepMeshes(map.at("rods"), out.source);
+  if (map.has("colliders")) keepMeshes(map.at("colliders"), out.source);
+  if (map.has("bodies")) keepMeshes(map.at("bodies"), out.source);
   return out;
 }
 

@@ -27,6 +27,11 @@ public:
     if (documents.size() != 1 || !documents[0].IsMap())
       throw SceneError(path + ":1: must be one JSON object, with a table 'position'");
     json_ = documents[0];
+    refuseUnknown(json_, {"position", "rod_vertex_offsets", "closed", "director", "skins"});
+    if (const YAML::Node skins = json_["skins"]) {
+      if (!skins.IsMap()) throw SceneError(path + ": 'skins' must be an object with tables, such as 'triangles'");
+      refuseUnknown(skins, {"point_offsets", "triangle_offsets", "triangles", "edge", "weight", "local"});
+    }
   }
   bool has(const std::string &name) const { return file_ ? file_->has(name) : bool(nodeOf(name)); }
   /// All numbers of a table, row by row.
@@ -53,8 +58,10 @@ public:
   std::vector<double> read(const std::string &name, std::size_t columns) const {
     Table table = read(name);
     if (table.values.size() != table.rows * columns)
-      throw SceneError(path_ + ": '" + name + "' must have " + std::to_string(columns) + " numbers in each of its " +
-                       std::to_string(table.rows) + " rows, found " + std::to_string(table.values.size()) + " in all");
+      throw SceneError(path_ + ": '" + name + "' must have " +
+                       (columns == 1 ? "one dimension" : "shape (n, " + std::to_string(columns) + ")") + ", found " +
+                       std::to_string(table.rows) + " rows and " + std::to_string(table.values.size()) +
+                       " numbers in all");
     return table.values;
   }
   std::vector<int> readWhole(const std::string &name, std::size_t columns) const {
@@ -78,6 +85,15 @@ private:
   std::optional<Hdf5File> file_;
   YAML::Node json_;
 
+  void refuseUnknown(const YAML::Node &map, const std::vector<std::string> &names) const {
+    for (const auto &entry : map) {
+      const std::string name = entry.first.Scalar();
+      if (std::find(names.begin(), names.end(), name) != names.end()) continue;
+      const std::string near = closest(name, names);
+      throw SceneError(path_ + ":" + std::to_string(entry.first.Mark().line + 1) + ": unknown table " + excerpt(name) +
+                       (near.empty() ? "" : "; did you mean '" + near + "'?"));
+    }
+  }
   std::optional<YAML::Node> nodeOf(const std::string &name) const {
     const std::size_t slash = name.find('/');
     const YAML::Node &top = json_; // of a node that may change, [] makes what is missing
@@ -90,16 +106,28 @@ private:
     if (!inner) return {};
     return inner;
   }
-  void add(const YAML::Node &node, const std::string &name, std::vector<double> &values) const {
+  /// Rows must be alike. \return how many numbers it has
+  std::size_t add(const YAML::Node &node, const std::string &name, std::vector<double> &values) const {
     if (node.IsSequence()) {
-      for (const YAML::Node &item : node) add(item, name, values);
-      return;
+      std::size_t before = 0, all = 0;
+      bool first = true;
+      for (const YAML::Node &item : node) {
+        const std::size_t count = add(item, name, values);
+        if (!first && count != before)
+          throw SceneError(path_ + ":" + std::to_string(item.Mark().line + 1) + ": a row of '" + name + "' has " +
+                           std::to_string(count) + " numbers, and the one before " + std::to_string(before));
+        first = false;
+        before = count;
+        all += count;
+      }
+      return all;
     }
     const YamlValue value(node, path_, name);
     if (node.IsScalar() && (node.Scalar() == "true" || node.Scalar() == "false"))
       values.push_back(value.boolean());
     else
       values.push_back(value.number());
+    return 1;
   }
 };
 
@@ -191,6 +219,8 @@ void readSkins(const Tables &tables, std::vector<Polyline> &lines) {
                       "names point " + std::to_string(corners[k]) + ", and its rod has " + std::to_string(count) +
                           ", numbered from 0");
       }
+      if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0])
+        tables.fail("skins/triangles", std::size_t(row), "names one point twice");
       skin->triangles.push_back(corners);
     }
     if (count > 0 && skin->triangles.empty())
@@ -236,6 +266,8 @@ std::vector<Polyline> readShapes(const std::string &path) {
   if (!closed.empty() && closed.size() != rods)
     throw SceneError(path + ": 'closed' must have one number per rod (" + std::to_string(rods) + "), found " +
                      std::to_string(closed.size()));
+  for (std::size_t r = 0; r < closed.size(); ++r)
+    if (closed[r] != 0 && closed[r] != 1) tables.fail("closed", r, "is neither 0 nor 1");
   std::vector<Polyline> lines(rods);
   std::size_t edges = 0;
   for (std::size_t r = 0; r < rods; ++r) {
@@ -291,6 +323,25 @@ void write(Hdf5File &file, const SkinTables &skins) {
   file.write("skins/local", {n, k, 3}, skins.local.data(), "m");
 }
 
+void checkShapesPath(const std::string &path, const std::vector<std::string> &inputs, const std::string &output_dir) {
+  if (path.empty()) return;
+  const std::string option = "option -output_shapes: '" + inOneLine(path) + "' ";
+  const std::string extension = extensionOf(path);
+  if (extension != ".json" && extension != ".h5" && extension != ".hdf5")
+    throw SceneError(option + "is no file of shapes; its name ends in .h5, .hdf5 or .json");
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  if (!folder.empty() && folder != output_dir && !std::filesystem::is_directory(folder))
+    throw SceneError(option + "is in a folder that is not there; make it first");
+  std::error_code error;
+  for (const std::string &input : inputs)
+    if (std::filesystem::equivalent(path, input, error))
+      throw SceneError(option + "is read by this run; choose another file");
+  const std::string name = std::filesystem::path(path).filename().string();
+  if ((name == "trajectory.h5" || name == "checkpoint.h5") &&
+      (folder == output_dir || std::filesystem::equivalent(folder, output_dir, error)))
+    throw SceneError(option + "has the name of a result of this run; choose another one");
+}
+
 void writeShapes(const std::string &path, const Scene &scene) {
   std::vector<double> position, director;
   std::vector<int> offsets{0}, closed;
@@ -301,9 +352,6 @@ void writeShapes(const std::string &path, const Scene &scene) {
     closed.push_back(rod.closed);
   }
   const SkinTables skins(scene.rods);
-  const std::string extension = extensionOf(path);
-  if (!isJson(path) && extension != ".h5" && extension != ".hdf5")
-    throw SceneError(path + ": shapes are written to a file .h5, .hdf5 or .json");
   if (!isJson(path)) {
     Hdf5File file = Hdf5File::create(path);
     file.write("position", {position.size() / 3, 3}, position.data(), "m");

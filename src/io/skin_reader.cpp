@@ -4,6 +4,7 @@
 #include "tendril/io/mesh_reader.hpp"
 
 #include <filesystem>
+#include <stdexcept>
 
 namespace tendril {
 namespace {
@@ -43,7 +44,12 @@ void readMeshOf(const YamlValue &value, SkinRecipe *skin) {
   YamlMap map(value, "rods[].skin.mesh");
   const YamlValue file = map.at("rods[].skin.mesh.file");
   const std::string path = (std::filesystem::path(file.file()).parent_path() / file.text()).string();
-  TriangleMesh mesh = readMesh(path);
+  TriangleMesh mesh;
+  try {
+    mesh = readMesh(path);
+  } catch (const SceneError &e) {
+    file.fail(e.what());
+  }
   const double scale = map.number("rods[].skin.mesh.scale");
   const Vec3 turn = map.vector("rods[].skin.mesh.rotation"), shift = map.vector("rods[].skin.mesh.translation");
   const Mat3 rotation =
@@ -117,7 +123,13 @@ void putSkin(YamlMap &map, const SkinRecipe &recipe, const Vec3 &shift, Rod &rod
   if (const double turn = widestTurn(rod, skin) * 180 / pi; turn > 30)
     out.notes.push_back(place + "shrinks where edges turn by " + shortText(turn) +
                         " degrees, by the cosine of half of that; take more edges");
-  if (const double far = farthestOverMedian(rod, skin); far > 10)
+  try {
+    checkClosed(rod, skin);
+  } catch (const std::invalid_argument &e) {
+    out.notes.push_back(place + "encloses no solid: " + e.what() +
+                        "; pictures have it, 'contact: {on: surface}' refuses it");
+  }
+  if (const double far = farthestOverMedian(skin); far > 10)
     out.notes.push_back(place + "has points " + shortText(far) +
                         " times as far from it as most: is the mesh where the rod is?");
 }

@@ -195,7 +195,8 @@ void TouchingRods::visitCloud(const TouchingPair &p, const std::array<Vec3, 4> &
     const ContactSettings &spheres = settings(to_rod);
     std::array<SamplePoint, 3> sphere;
     const int count = spheresOf(to_rod, to_edge, sphere);
-    const std::vector<SamplePoint> &points = points_[std::size_t(settings(rod).quadrature)];
+    const std::vector<SamplePoint> &points =
+        points_[std::size_t(settings(rod).on_surface ? 0 : settings(rod).quadrature)];
     for (std::size_t k = 0; k < points.size(); ++k)
       for (int n = 0; n < count; ++n) {
         const SamplePoint &point = points[k], &at = sphere[std::size_t(n)];

@@ -31,9 +31,9 @@ struct SkinSample {
 /// first edges.
 std::vector<SkinSample> skinSamples(const Rod &rod, const Skin &skin, int points, int edges);
 
-/// Area [m^2] of a skin as drawn, and the volume in it where it is closed [m^3].
+/// Area [m^2] of a skin as drawn, the volume in it where it is closed [m^3], and the longest side of a triangle [m].
 struct SkinMeasure {
-  double area = 0, volume = 0;
+  double area = 0, volume = 0, side = 0;
 };
 SkinMeasure measureOf(const Rod &rod, const Skin &skin);
 /// Throws std::invalid_argument that says what is wrong with a surface that is not closed, or inside out.
@@ -41,7 +41,7 @@ void checkClosed(const Rod &rod, const Skin &skin);
 /// Largest turn of the tangents of two edges that carry one point, as drawn [rad]; linear weights shrink the section
 /// there by the cosine of its half.
 double widestTurn(const Rod &rod, const Skin &skin);
-/// Largest distance of points from the rod over the middle one.
-double farthestOverMedian(const Rod &rod, const Skin &skin);
+/// Largest distance of points from the axis, across it, over the middle one.
+double farthestOverMedian(const Skin &skin);
 
 } // namespace tendril

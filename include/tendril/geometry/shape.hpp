@@ -30,6 +30,14 @@ public:
   virtual bool isConvex() const { return false; }
 };
 
+/// Signed distance of one point [m].
+inline double distanceAt(const Shape &shape, const Vec3 &x) {
+  const double *const point[3] = {&x[0], &x[1], &x[2]};
+  double distance;
+  shape.distances(point, 1, &distance);
+  return distance;
+}
+
 /// All below the plane z = 0.
 std::shared_ptr<const Shape> makeHalfSpace();
 std::shared_ptr<const Shape> makeSphere(double radius);

@@ -20,6 +20,8 @@ public:
   std::vector<std::string> checkpoints() const;
   /// Whether a run here would remove or replace a file: it has the name and the place of a result.
   bool replaces(const std::string &file) const;
+  /// \throws SceneError where it would one of the files that the run reads
+  void refuseToReplace(const std::vector<std::string> &inputs) const;
   /// Removes results of earlier runs, with all parts; names of what went.
   std::vector<std::string> clear() const;
   /// Makes room for a run that goes on from one of checkpoints(): moves the results that it is of to part_1, part_2

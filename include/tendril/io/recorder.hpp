@@ -61,7 +61,6 @@ private:
   double most_kinetic_ = 0, first_stored_ = NAN, most_stored_ = 0;        ///< [J]
 
   bool leads() const { return prepared_.team.leads(); }
-  void writeShapesOf(const Prepared &prepared) const; ///< -output_shapes
   void writeFrame(const State &whole);
   void noteSpins(const State &whole);
   void tellInstability(const Diagnostics &row);

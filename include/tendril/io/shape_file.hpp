@@ -18,6 +18,10 @@ std::vector<Polyline> readShapes(const std::string &path);
 /// Writes the rods of a scene as drawn so that readShapes gives the same bits. \throws WriteError
 void writeShapes(const std::string &path, const Scene &scene);
 
+/// What -output_shapes names must be a file of that kind, in a folder that is there, and none that the run reads or
+/// that stands for its results. Empty is right. \throws SceneError
+void checkShapesPath(const std::string &path, const std::vector<std::string> &inputs, const std::string &output_dir);
+
 /// Tables of skins, those of several rods behind each other.
 struct SkinTables {
   std::vector<int> point_offsets{0}, triangle_offsets{0}, triangles, edge;

@@ -71,7 +71,7 @@ struct ContactSettings {
   /// Distance from the surface of a shape that no motion passes [m]: of a penalty, short of where the axis of the rod,
   /// or without a radius the middle of the obstacle, would be passed.
   double wall(const Shape &shape) const {
-    return isBarrier() ? -0.5 * distance : radius > 0 ? -0.8 * radius : -0.8 * shape.depth();
+    return isBarrier() ? -0.5 * distance : padding() > 0 ? -0.8 * padding() : -0.8 * shape.depth();
   }
   /// About a sample [m].
   double padding() const { return on_surface ? 0 : radius; }
