@@ -234,6 +234,13 @@ SkinMeasure measureOf(const Rod &rod, const Skin &skin) {
 
 void checkClosed(const Rod &rod, const Skin &skin) { (void)MeshDistance({placesOf(rod, skin), skin.triangles}); }
 
+std::vector<bool> isInside(const Rod &rod, const Skin &skin, const std::vector<Vec3> &places) {
+  const MeshDistance distance({placesOf(rod, skin), skin.triangles});
+  std::vector<bool> inside;
+  for (const Vec3 &y : places) inside.push_back(distance.nearest(y).value < 0);
+  return inside;
+}
+
 double widestTurn(const Rod &rod, const Skin &skin) {
   double least = 1;
   for (const SkinPoint &p : skin.points)

@@ -174,6 +174,25 @@ void refuseTearing(const Simulation &run) {
   }
 }
 
+/// Obstacles that stand whole within a skin are touched by none of its points.
+static void refuseWithinSkins(const Scene &scene) {
+  std::vector<Vec3> middles;
+  for (const Collider &c : scene.colliders) {
+    const bool is_there = c.kind == "sphere" || c.kind == "capsule" || c.kind == "cylinder" || c.kind == "box";
+    middles.push_back(is_there ? c.position : Vec3(Vec3::Constant(1e30)));
+  }
+  for (std::size_t r = 0; r < scene.rods.size() && !middles.empty(); ++r) {
+    const Rod &rod = scene.rods[r];
+    if (!rod.contact.on || !rod.contact.on_surface) continue;
+    const std::vector<bool> inside = isInside(rod, skinOf(rod), middles);
+    for (std::size_t k = 0; k < inside.size(); ++k)
+      if (inside[k] &&
+          std::find(rod.contact.passes.begin(), rod.contact.passes.end(), int(k)) == rod.contact.passes.end())
+        throw SceneError("collider '" + scene.colliders[k].name + "' has its middle within the skin of rod '" +
+                         rod.name + "' at its start; move one of them, or write 'contact: none'");
+  }
+}
+
 void refuseOverlaps(const Simulation &run) {
   const Scene &scene = run.scene;
   const Configuration drawn = configurationOf(run.state, scene, *run.elements, run.state.time);
@@ -206,6 +225,7 @@ void refuseOverlaps(const Simulation &run) {
                        scene.colliders[std::size_t(o.collider)].name +
                        "'; move one of them, or write 'contact: none' "
                        "in the block of the body");
+  refuseWithinSkins(scene);
   for (const Touch &o : tightest(scene, *run.elements, drawn)) {
     const ContactSettings &contact = scene.rods[o.rod].contact;
     const double wall = contact.wall(*scene.colliders[o.collider].shape);

@@ -340,8 +340,8 @@ TEST(ShapeFile, MistakesNameTheTableAndTheRow) {
       {"position", -2, {}, {}, {"'position'", "has no"}},
       {"position", 4, {nan}, {}, {"'position'", "finite"}},
       {"position", 4, {inf}, {}, {"'position'", "finite"}},
-      {"position", -1, {0, 0, 1, 1}, {2, 2}, {"'position' must have 3 numbers in each of its 2 rows, found 4 in all"}},
-      {"position", -1, {0, 0, 0, 1, 1, 1}, {6}, {"'position' must have 3 numbers in each of its 6 rows"}},
+      {"position", -1, {0, 0, 1, 1}, {2, 2}, {"'position' must have shape (n, 3), found 2 rows and 4 numbers in all"}},
+      {"position", -1, {0, 0, 0, 1, 1, 1}, {6}, {"'position' must have shape (n, 3), found 6 rows"}},
       {"rod_vertex_offsets", 1, {2.5}, {}, {"row 1 of 'rod_vertex_offsets' is not a whole number"}},
       {"rod_vertex_offsets", 1, {3e9}, {}, {"row 1 of 'rod_vertex_offsets' is not a whole number"}},
       {"rod_vertex_offsets", 2, {6}, {}, {"'rod_vertex_offsets' must rise from 0 to 7", "two or more a rod"}},
@@ -349,7 +349,7 @@ TEST(ShapeFile, MistakesNameTheTableAndTheRow) {
       {"rod_vertex_offsets", 1, {6}, {}, {"'rod_vertex_offsets' must rise from 0 to 7"}},
       {"rod_vertex_offsets", 1, {-2}, {}, {"'rod_vertex_offsets' must rise from 0 to 7"}},
       {"rod_vertex_offsets", -1, {7}, {1}, {"'rod_vertex_offsets' must rise from 0 to 7"}},
-      {"rod_vertex_offsets", -1, {0, 3, 3, 7}, {2, 2}, {"'rod_vertex_offsets' must have 1 numbers in each of its 2"}},
+      {"rod_vertex_offsets", -1, {0, 3, 3, 7}, {2, 2}, {"'rod_vertex_offsets' must have one dimension, found 2"}},
       {"closed", -1, {1}, {1}, {"'closed' must have one number per rod (2), found 1"}},
       {"closed", -1, {0, 1, 1}, {3}, {"'closed' must have one number per rod (2), found 3"}},
       {"closed", 1, {0.5}, {}, {"row 1 of 'closed' is not a whole number"}},
@@ -386,7 +386,7 @@ TEST(ShapeFile, MistakesNameTheTableAndTheRow) {
       {"skins/triangles", 5, {4}, {}, {"row 1 of 'skins/triangles' names point 4, and its rod has 4, numbered from 0"}},
       {"skins/triangles", 13, {-1}, {}, {"row 4 of 'skins/triangles' names point -1, and its rod has 4"}},
       {"skins/triangles", 13, {1.5}, {}, {"row 4 of 'skins/triangles' is not a whole number"}},
-      {"skins/triangles", -1, {0, 2, 1, 3}, {1, 4}, {"'skins/triangles' must have 3 numbers in each of its 1 rows"}},
+      {"skins/triangles", -1, {0, 2, 1, 3}, {1, 4}, {"'skins/triangles' must have shape (n, 3), found 1 rows"}},
       {"skins/edge", 3, {2}, {}, {"row 1 of 'skins/edge' names edge 2, and its rod has 2, numbered from 0"}},
       {"skins/edge", 3, {-1}, {}, {"row 1 of 'skins/edge' names edge -1, and its rod has 2"}},
       {"skins/edge", 3, {0}, {}, {"row 1 of 'skins/edge' has edges 0 and 0, which do not follow each other"}},
@@ -459,12 +459,15 @@ TEST(ShapeFile, FilesThatAreNone) {
 TEST(ShapeFile, IsNotWrittenWhereItCannotBe) {
   const Folder folder;
   const Scene scene = threeRods(folder);
-  for (const char *name : {"a.obj", "a", "a.yaml", "a.json.txt"}) {
-    EXPECT_TRUE(says(messageOf([&] { writeShapes(folder.path(name), scene); }),
-                     "shapes are written to a file .h5, .hdf5 or .json"))
+  for (const char *name : {"a.obj", "a", "a.yaml", "a.json.txt"})
+    EXPECT_TRUE(says(messageOf([&] { checkShapesPath(folder.path(name), {}, "out"); }), "ends in .h5, .hdf5 or .json"))
         << name;
-    EXPECT_FALSE(std::filesystem::exists(folder.path(name)));
-  }
+  EXPECT_TRUE(says(messageOf([&] { checkShapesPath(folder.path("none/a.json"), {}, "out"); }), "make it first"));
+  const std::string read = folder.write("read.json", "{}");
+  EXPECT_TRUE(says(messageOf([&] { checkShapesPath(read, {read}, "out"); }), "is read by this run"));
+  EXPECT_TRUE(says(messageOf([&] { checkShapesPath("out/trajectory.h5", {}, "out"); }), "a result of this run"));
+  EXPECT_NO_THROW(checkShapesPath("out/shapes.h5", {read}, "out"));
+  EXPECT_NO_THROW(checkShapesPath("", {read}, "out"));
   for (const char *name : {"none/a.json", "none/a.h5"}) {
     const std::string message = messageOf([&] { writeShapes(folder.path(name), scene); });
     EXPECT_TRUE(says(message, name));

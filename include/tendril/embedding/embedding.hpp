@@ -38,6 +38,8 @@ struct SkinMeasure {
 SkinMeasure measureOf(const Rod &rod, const Skin &skin);
 /// Throws std::invalid_argument that says what is wrong with a surface that is not closed, or inside out.
 void checkClosed(const Rod &rod, const Skin &skin);
+/// Which of some places are in a closed skin as drawn.
+std::vector<bool> isInside(const Rod &rod, const Skin &skin, const std::vector<Vec3> &places);
 /// Largest turn of the tangents of two edges that carry one point, as drawn [rad]; linear weights shrink the section
 /// there by the cosine of its half.
 double widestTurn(const Rod &rod, const Skin &skin);
