@@ -118,32 +118,38 @@ void RodContacts::placeSamples(const Configuration &c, Samples &out) const {
   }
 }
 
-/// Each edge goes to the axes of the obstacle once.
+/// Each edge goes to the axes of the obstacle once, and all of its samples follow.
 void RodContacts::placeOnSkin(const Configuration &c, int begin, Samples &out) const {
-  struct Axes {
-    Vec3 from, along, director, second;
-  };
-  std::array<Axes, chunk_edges + 1> edges;
-  for (int i = 0; i < verticesOf(out.chunk) - 1; ++i) {
-    const int slot = rod_.slot(begin + i); // behind a ring a copy
+  using Axes = Eigen::Matrix<double, 3, 4>; // of an edge: its first vertex, its vector, both directors
+  const Mat3 turn = out.pose.rotation.transpose();
+  auto axesOf = [&](int edge) {
+    Axes axes = Axes::Zero();
+    if (edge + 1 >= verticesOf(out.chunk)) return axes; // nothing is carried by it
+    const int slot = rod_.slot(begin + edge);           // behind a ring a copy
     const Frame frame = c.frameAt(slot);
-    const Mat3 turn = out.pose.rotation.transpose();
-    const Vec3 from = c.positionAt(slot);
-    edges[i] = {turn * (from - out.pose.position), turn * (c.positionAt(slot + 1) - from), turn * frame.director,
-                turn * frame.secondDirector()};
-  }
-  for (int k = 0; k < out.count; ++k) {
-    const EdgePoint &point = onSkin(out, k).point;
-    const int first = point.slot() - rod_.slot(begin);
-    Vec3 x = Vec3::Zero();
-    for (int j = 0; j < point.edges; ++j) {
-      const auto &[slot, next, weight, carried] = point.by[j];
-      const Axes &e = edges[first + j];
-      x += weight * (e.from + carried.at * e.along + carried.arm[1] * e.director + carried.arm[2] * e.second);
+    axes << c.positionAt(slot) - out.pose.position, c.edges<double>(slot), frame.director, frame.secondDirector();
+    return Axes(turn * axes);
+  };
+  const int first = firstOnSkin(out.chunk) + out.first;
+  int done = 0;
+  for (int edge = onSkin(out, 0).point.slot() - rod_.slot(begin); done < out.count; ++edge) {
+    const int end = std::min(skin_.first(begin + edge + 1) - first, out.count);
+    if (end <= done) continue;
+    const Axes one = axesOf(edge), other = axesOf(edge + 1);
+    const auto part = skin_.partsFrom(first);
+    for (int a = 0; a < 3; ++a) {
+      double *const to = out.local[a].data();
+      const double f0 = one(a, 0), f1 = one(a, 1), f2 = one(a, 2), f3 = one(a, 3), g0 = other(a, 0), g1 = other(a, 1),
+                   g2 = other(a, 2), g3 = other(a, 3);
+      for (int k = done; k < end; ++k)
+        to[k] = part[0][k] * f0 + part[1][k] * f1 + part[2][k] * f2 + part[3][k] * f3 + part[4][k] * g0 +
+                part[5][k] * g1 + part[6][k] * g2 + part[7][k] * g3;
     }
-    out.slot[k] = point.slot();
-    out.point[k] = firstOnSkin(out.chunk) + out.first + k - skin_.first(begin + first);
-    for (int a = 0; a < 3; ++a) out.local[a][k] = x[a];
+    for (int k = done; k < end; ++k) {
+      out.slot[k] = rod_.slot(begin + edge);
+      out.point[k] = first + k - skin_.first(begin + edge);
+    }
+    done = end;
   }
 }
 

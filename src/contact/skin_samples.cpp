@@ -29,6 +29,12 @@ SkinSamples::SkinSamples(const Rod &rod, const RodRange &range) : first_(std::si
       gain += s.point.weight[k] * (std::abs(1 - at) + std::abs(at));
     }
     gain_ = std::max(gain_, gain);
+    for (std::size_t k = 0; k < 2; ++k) {
+      const auto &[slot, next, weight, carried] = sample.point.by[k];
+      const double part = k < std::size_t(s.point.edges) ? weight : 0;
+      const double of[] = {part, part * carried.at, part * carried.arm[1], part * carried.arm[2]};
+      for (std::size_t p = 0; p < 4; ++p) parts_[4 * k + p].push_back(part == 0 ? 0 : of[p]);
+    }
     ++first_[std::size_t(s.point.edge[0] + 1)];
   }
   for (std::size_t e = 1; e < first_.size(); ++e) first_[e] += first_[e - 1];

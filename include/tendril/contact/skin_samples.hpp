@@ -27,6 +27,14 @@ public:
   /// How many are before those of an edge.
   int first(int edge) const { return first_[edge]; }
   const OnSkin &operator[](int k) const { return samples_[k]; }
+  /// Parts that samples from one on have of what carries them, as place() takes them: of the first edge its first
+  /// vertex, its vector and both directors, then of the second.
+  static constexpr int parts = 8;
+  std::array<const double *, parts> partsFrom(int k) const {
+    std::array<const double *, parts> from;
+    for (int p = 0; p < parts; ++p) from[p] = parts_[p].data() + k;
+    return from;
+  }
 
   // How far samples are at most from the nearest vertex of the edges that carry them: so much [m], and so many of the
   // longest edge; and how much faster they go than vertices, but for their arms.
@@ -37,6 +45,7 @@ public:
 private:
   std::vector<OnSkin> samples_; ///< in the order of their first edges
   std::vector<int> first_;      ///< per edge, and the end
+  std::array<std::vector<double>, parts> parts_;
   double arm_ = 0, apart_ = 0.5, gain_ = 1;
 };
 
