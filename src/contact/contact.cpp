@@ -212,7 +212,8 @@ private:
         const double stopping =
             step.isStatic() ? 0 : momentumTowards(scene_, elements_, rod, state, step.dt, r) / step.dt;
         force += stopping;
-        stiffness = barrierStiffness(scene_, elements_, force, pressure, step.isStatic(), r);
+        stiffness =
+            barrierStiffness(scene_, elements_, force, pressure, step.isStatic(), r, scene_.rods[r].contact.on_surface);
         if (!step.isStatic() && before == 0) { // what is drawn touching is not thrown off
           rod.setStiffness(stiffness);
           stiffness *= partBorne(rod, start, resultantLoad(scene_, elements_, r, length), stopping);

@@ -14,12 +14,11 @@ bool carriesSurface(const Rod &rod) {
 }
 
 double barrierStiffness(const Scene &scene, const Elements &elements, double force, double pressure, bool is_static,
-                        int r) {
+                        int r, bool on_surface) {
   const Rod &rod = scene.rods[r];
   const double length = elements.length(r);
-  // Of a skin a strip bears all, as wide as that of a tube within the barrier of a plane.
-  const double strip =
-      rod.contact.on_surface ? std::max(1.0, pi * std::sqrt(rod.contact.radius / (2 * rod.contact.distance))) : 1;
+  // The strip is as wide as that of a tube within the barrier of a plane.
+  const double strip = on_surface ? std::max(1.0, pi * std::sqrt(rod.contact.radius / (2 * rod.contact.distance))) : 1;
   double wanted = std::max(strip * force / (20 * rod.contact.radius), 0.1 * pressure);
   if (rod.gravity) wanted = std::max(wanted, 10 * strip * rod.material.linear_density * scene.gravity.norm());
   // What bends it by its own length: where nothing pulls, and in statics, where supports press it as its bending asks.

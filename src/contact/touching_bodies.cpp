@@ -108,7 +108,7 @@ NormalLaw TouchingBodies::makeLaw(const TouchingPair &p) const {
   const ContactSettings &contact = settingsOf(p, edge);
   if (!contact.isBarrier() || contact.stiffness > 0) return {contact, contact.stiffness};
   const double force = load_[std::size_t(r)] + solids_[std::size_t(p.body(1 - edge))].force;
-  return {contact, part * barrierStiffness(scene_, elements_, force, 0, static_, r)};
+  return {contact, part * barrierStiffness(scene_, elements_, force, 0, static_, r, contact.on_surface)};
 }
 
 /// What is drawn touching is not thrown off: two that touch press on each other by no more than the lesser load.

@@ -65,29 +65,9 @@ TEST(Friction, ForceIsTheSlopeOfItsPotential) {
 }
 
 TEST(Friction, DerivativesAreThoseOfTheEnergy) {
-  for (const bool at_surface : {false, true}) {
-    Simulation sim;
-    Scene scene = onIncline(0.5, 0.3, Vec3(1, 1, 0).normalized(), at_surface, 8);
-    EXPECT_PETSC(sim.setUp(scene, dynamics(1e-2, 1)));
-    TimeLoop loop(sim.solver, dynamics(1e-2, 0.2));
-    bool finished;
-    EXPECT_PETSC(loop.run(
-        sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
-    IncrementalPotential &potential = *sim.potential;
-    Step step;
-    step.dt = 1e-2;
-    step.time = sim.state.time + 1e-2;
-    step.mixed = false;
-    sim.solver.begin(sim.state, step);
-    Random random{5};
-    Configuration moved;
-    ASSERT_TRUE(
-        potential.tryMove(randomIncrement(potential, random, 1e-4, 5e-2), 0.5, 0, RetractionKind::additive, moved));
-    potential.accept(moved, 0);
-    potential.resetAxialForces(0);
-    expectDerivatives(potential, randomIncrement(potential, random, 1e-4, 5e-2), 1e-2, 1e-5, 1e-4,
-                      at_surface ? "at the surface" : "at the centreline");
-  }
+  for (const bool at_surface : {false, true})
+    expectDerivativesAfter(onIncline(0.5, 0.3, Vec3(1, 1, 0).normalized(), at_surface, 8), 1e-2, 0.2,
+                           at_surface ? "at the surface" : "at the centreline");
 }
 
 /// contact_incline.csv: mu = 0.5. Lying across it would roll; along it, nothing turns.

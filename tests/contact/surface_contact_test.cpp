@@ -197,27 +197,7 @@ TEST(SurfaceContact, DerivativesAreThoseOfTheEnergy) {
     Scene scene = onPlane(8, 0.5, 0.3, 8);
     scene.rods[0].contact.quadrature = points;
     scene.colliders.push_back(solid(makeSphere(0.02), Vec3(0.12, 0.0252, 0.004)));
-    Simulation sim;
-    EXPECT_PETSC(sim.setUp(scene, dynamics(1e-2, 1)));
-    TimeLoop loop(sim.solver, dynamics(1e-2, 0.1));
-    bool finished;
-    EXPECT_PETSC(loop.run(
-        sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
-    EXPECT_TRUE(finished) << loop.failure();
-    IncrementalPotential &potential = *sim.potential;
-    Step step;
-    step.dt = 1e-2;
-    step.time = sim.state.time + 1e-2;
-    step.mixed = false;
-    sim.solver.begin(sim.state, step);
-    Random random{5};
-    Configuration moved;
-    ASSERT_TRUE(
-        potential.tryMove(randomIncrement(potential, random, 1e-4, 5e-2), 0.5, 0, RetractionKind::additive, moved));
-    potential.accept(moved, 0);
-    potential.resetAxialForces(0);
-    expectDerivatives(potential, randomIncrement(potential, random, 1e-4, 5e-2), 1e-2, 1e-5, 1e-4,
-                      std::to_string(points));
+    expectDerivativesAfter(scene, 1e-2, 0.1, std::to_string(points));
   }
 }
 

@@ -82,6 +82,29 @@ TEST(Tube, OfARingHasThoseOfATorusToSecondOrder) {
   }
 }
 
+/// The section of a strip goes with the directors of a rod that is twisted as drawn; one of a round tube does not.
+TEST(Tube, OfAStripGoesWithDirectors) {
+  const int edges = 12, sides = 8;
+  SkinRecipe recipe;
+  recipe.tube = {sides, {0.03, 0.01}, true, false};
+  Rod rod = skinned(straight(1, edges), recipe);
+  for (int e = 0; e < edges; ++e) rod.director[std::size_t(e)] = Vec3(std::cos(0.3 * e), std::sin(0.3 * e), 0);
+  const Skin skin = skinOf(rod);
+  for (int e = 0; e < edges; ++e) { // behind the ring at the first end
+    const Vec3 middle(0, 0, (e + 0.5) / edges);
+    const Vec3 along = placeOf(rod, skin.points[std::size_t((e + 1) * sides)]) - middle,
+               across = placeOf(rod, skin.points[std::size_t((e + 1) * sides + sides / 4)]) - middle;
+    EXPECT_LT((along - 0.03 * rod.director[std::size_t(e)]).norm(), 1e-15);
+    EXPECT_LT((across - 0.01 * Vec3::UnitZ().cross(rod.director[std::size_t(e)])).norm(), 1e-15);
+  }
+  recipe.tube = {sides, {0.02, 0.02}, false, false};
+  rod.skin = std::make_shared<SkinRecipe>(recipe);
+  const Skin round = skinOf(rod);
+  for (int e = 0; e < edges; ++e)
+    EXPECT_LT((placeOf(rod, round.points[std::size_t((e + 1) * sides)]) - Vec3(0.02, 0, (e + 0.5) / edges)).norm(),
+              1e-15);
+}
+
 /// A helix with two coils of a mesh about it: the corners of a tube.
 TriangleMesh meshAbout(const Rod &rod, int sides, double radius) {
   SkinRecipe recipe;

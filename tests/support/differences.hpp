@@ -1,6 +1,7 @@
 #pragma once
 /// Derivatives of a potential against differences of its energy.
 #include "support/random_cell.hpp"
+#include "support/rods.hpp"
 #include "tendril/solver/incremental_potential.hpp"
 
 #include <gtest/gtest.h>
@@ -35,6 +36,30 @@ inline void expectDerivatives(IncrementalPotential &potential, const Planes &v, 
   EXPECT_NEAR((-e[0] + 16 * e[1] - 30 * e[2] + 16 * e[3] - e[4]) / (12 * h * h), curvature,
               curvature_tolerance * curvature)
       << what;
+}
+
+/// The same in the step after a run: from a random place near its end, and along a random way.
+inline void expectDerivativesAfter(const Scene &scene, double dt, double until, const std::string &what) {
+  Simulation sim;
+  EXPECT_PETSC(sim.setUp(scene, dynamics(dt, 1)));
+  TimeLoop loop(sim.solver, dynamics(dt, until));
+  bool finished;
+  EXPECT_PETSC(loop.run(
+      sim.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+  EXPECT_TRUE(finished) << loop.failure();
+  IncrementalPotential &potential = *sim.potential;
+  Step step;
+  step.dt = dt;
+  step.time = sim.state.time + dt;
+  step.mixed = false;
+  sim.solver.begin(sim.state, step);
+  Random random{5};
+  Configuration moved;
+  ASSERT_TRUE(
+      potential.tryMove(randomIncrement(potential, random, 1e-4, 5e-2), 0.5, 0, RetractionKind::additive, moved));
+  potential.accept(moved, 0);
+  potential.resetAxialForces(0);
+  expectDerivatives(potential, randomIncrement(potential, random, 1e-4, 5e-2), 1e-2, 1e-5, 1e-4, what);
 }
 
 } // namespace tendril::test

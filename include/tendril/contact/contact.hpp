@@ -11,9 +11,9 @@ bool carriesSurface(const Rod &rod);
 
 /// Stiffness of the barrier of a rod [N/m]: ten times its weight per length, or where it has more to bear as much as
 /// keeps surfaces within the barrier; a power of four. \param force to bear [N] \param pressure on the sample that is
-/// pressed most [N/m]
+/// pressed most [N/m] \param on_surface whether its skin touches, of which a strip bears all
 double barrierStiffness(const Scene &scene, const Elements &elements, double force, double pressure, bool is_static,
-                        int rod);
+                        int rod, bool on_surface = false);
 
 /// A sample in contact, in the axes of the world.
 struct ContactPoint {
