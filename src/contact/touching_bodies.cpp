@@ -30,6 +30,14 @@ TouchingBodies::TouchingBodies(const Scene &scene, const Elements &elements, boo
   bearAsDrawn();
 }
 
+double TouchingBodies::aboutEdge(int r, int edge, const Configuration &c) const {
+  const SkinSamples &skin = skins_[std::size_t(r)];
+  const RodRange &rod = elements_.rods[std::size_t(r)];
+  const double *const length = c[Configuration::length];
+  const int next = rod.closed || edge + 1 < rod.edges ? (edge + 1) % rod.edges : edge;
+  return skin.arm() + skin.apart() * std::max(length[rod.slot(edge)], length[rod.slot(next)]);
+}
+
 double TouchingBodies::aboutAxis(int r, const Configuration &c) const {
   const SkinSamples &skin = skins_[std::size_t(r)];
   if (skin.empty()) return scene_.rods[std::size_t(r)].contact.radius;
@@ -77,7 +85,7 @@ TouchingBodies::Side TouchingBodies::sideOf(const TouchingPair &p, int side, con
 
 bool TouchingBodies::isAway(const TouchingPair &p, int side, const Side &samples, double reach) const {
   const Vec3 middle = samples.samples ? samples.first : Vec3(samples.first + 0.5 * samples.along);
-  const double about = samples.skin ? aboutAxis(p.rodOf(side), *samples.c) : samples.radius,
+  const double about = samples.skin ? aboutEdge(p.rodOf(side), p.edgeOf(side), *samples.c) : samples.radius,
                size = samples.samples ? solids_[std::size_t(p.body(side))].reach : 0.5 * samples.along.norm() + about;
   return distanceAt(solidOf(p.body(1 - side)), middle) > size + reach;
 }

@@ -141,6 +141,24 @@ std::vector<RulePoint> triangleRule(int points) {
   return rule;
 }
 
+void sortByEdges(std::vector<SkinSample> &samples) {
+  std::stable_sort(samples.begin(), samples.end(),
+                   [](const SkinSample &a, const SkinSample &b) { return a.point.edge[0] < b.point.edge[0]; });
+}
+
+std::vector<SkinSample> cornerSamples(const std::vector<Vec3> &places, const Skin &skin) {
+  std::vector<SkinSample> samples;
+  for (const SkinPoint &point : skin.points) samples.push_back({point, 0});
+  for (const auto &[a, b, c] : skin.triangles) {
+    const Vec3 &from = places[std::size_t(a)];
+    const double area = 0.5 * (places[std::size_t(b)] - from).cross(places[std::size_t(c)] - from).norm();
+    for (const int corner : {a, b, c}) samples[std::size_t(corner)].area += area / 3;
+  }
+  std::erase_if(samples, [](const SkinSample &s) { return s.area == 0; }); // of no triangle
+  sortByEdges(samples);
+  return samples;
+}
+
 std::vector<Vec3> placesOf(const Rod &rod, const Skin &skin) {
   std::vector<Vec3> places;
   for (const SkinPoint &point : skin.points) places.push_back(placeOf(rod, point));
@@ -187,8 +205,9 @@ Skin skinOf(const Rod &rod) {
 }
 
 std::vector<SkinSample> skinSamples(const Rod &rod, const Skin &skin, int points, int edges) {
-  const std::vector<RulePoint> rule = triangleRule(points);
   const std::vector<Vec3> places = placesOf(rod, skin);
+  if (points == ContactSettings::corners) return cornerSamples(places, skin);
+  const std::vector<RulePoint> rule = triangleRule(points);
   const Nearest nearest(rod);
   const int n = rod.edges();
   std::vector<SkinSample> samples;
@@ -215,8 +234,7 @@ std::vector<SkinSample> skinSamples(const Rod &rod, const Skin &skin, int points
       samples.push_back({carried({rod, first, count}, y, nearest.on(y, first, count).edge, edges), p.weight * area});
     }
   }
-  std::stable_sort(samples.begin(), samples.end(),
-                   [](const SkinSample &a, const SkinSample &b) { return a.point.edge[0] < b.point.edge[0]; });
+  sortByEdges(samples);
   return samples;
 }
 

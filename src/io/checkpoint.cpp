@@ -122,8 +122,7 @@ template <class Archive, class AnyContents> void exchange(Archive &a, AnyContent
   exchangePairs(a, s, whole);
 }
 
-/// Whole turns of cells that were others in the checkpoint: the twist of a vertex along the rod stays what it was, by
-/// whole cell or halves.
+/// Whole turns of cells that were others in the checkpoint: twists of vertices stay as they were, by cells or halves.
 void carryTurns(const Simulation &run, const Contents &old, const std::vector<double> &places, State *state) {
   state->winding.assign(places.size(), 0.0);
   if (!countsTurns(*run.elements) || old.twists.size() != old.cells.size()) return;
@@ -159,6 +158,7 @@ void beginAnew(const Simulation &run, State *state, std::vector<std::string> *to
   state->strains.clear();
   state->support_actions.clear();
   state->contacts.clear();
+  state->pairs.clear();
   state->last_dt = state->dt_before = 0;
   const Configuration c = configurationOf(*state, run.scene, *run.elements, state->time);
   for (std::size_t r = 0; r < run.elements->rods.size(); ++r) {

@@ -176,20 +176,34 @@ void refuseTearing(const Simulation &run) {
 
 /// Obstacles that stand whole within a skin are touched by none of its points.
 static void refuseWithinSkins(const Scene &scene) {
-  std::vector<Vec3> middles;
-  for (const Collider &c : scene.colliders) {
-    const bool is_there = c.kind == "sphere" || c.kind == "capsule" || c.kind == "cylinder" || c.kind == "box";
-    middles.push_back(is_there ? c.position : Vec3(Vec3::Constant(1e30)));
-  }
-  for (std::size_t r = 0; r < scene.rods.size() && !middles.empty(); ++r) {
-    const Rod &rod = scene.rods[r];
+  for (const Rod &rod : scene.rods) {
     if (!rod.contact.on || !rod.contact.on_surface) continue;
+    std::vector<std::string> names;
+    std::vector<Vec3> middles;
+    auto isSolid = [](const std::string &kind) {
+      return kind == "sphere" || kind == "capsule" || kind == "cylinder" || kind == "box";
+    };
+    for (int k = 0; k < int(scene.colliders.size()); ++k) {
+      const Collider &c = scene.colliders[std::size_t(k)];
+      const std::vector<int> &passes = rod.contact.passes;
+      if (!isSolid(c.kind) || std::find(passes.begin(), passes.end(), k) != passes.end()) continue;
+      names.push_back("collider '" + c.name + "'");
+      middles.push_back(c.position);
+    }
+    for (const Body &b : scene.bodies) {
+      if (!isSolid(b.shape) || !rod.contact.touchesBodies() || !b.contact.touchesBodies() ||
+          rod.contact.isApartFrom(b.contact))
+        continue;
+      names.push_back("body '" + b.name + "'");
+      middles.push_back(b.position);
+    }
+    if (middles.empty()) continue;
     const std::vector<bool> inside = isInside(rod, skinOf(rod), middles);
     for (std::size_t k = 0; k < inside.size(); ++k)
-      if (inside[k] &&
-          std::find(rod.contact.passes.begin(), rod.contact.passes.end(), int(k)) == rod.contact.passes.end())
-        throw SceneError("collider '" + scene.colliders[k].name + "' has its middle within the skin of rod '" +
-                         rod.name + "' at its start; move one of them, or write 'contact: none'");
+      if (inside[k])
+        throw SceneError(
+            names[k] + " has its middle within the skin of rod '" + rod.name +
+            "' as drawn; move one of them, write 'contact: none', or name both in 'contact: {ignore: ...}'");
   }
 }
 
@@ -225,7 +239,7 @@ void refuseOverlaps(const Simulation &run) {
                        scene.colliders[std::size_t(o.collider)].name +
                        "'; move one of them, or write 'contact: none' "
                        "in the block of the body");
-  refuseWithinSkins(scene);
+  if (run.state.step == 0) refuseWithinSkins(scene);
   for (const Touch &o : tightest(scene, *run.elements, drawn)) {
     const ContactSettings &contact = scene.rods[o.rod].contact;
     const double wall = contact.wall(*scene.colliders[o.collider].shape);
@@ -269,9 +283,10 @@ std::vector<std::string> notesOnContact(const Simulation &run) {
           shortText(contact.distance) + " m wants " + shortText(wanted) +
           " m: other rods may stop between them; take shorter edges or a larger 'contact: {distance: ...}'");
     if (contact.quadrature == 0) continue;
-    const double apart = contact.on_surface ? measureOf(run.scene.rods[r], skinOf(run.scene.rods[r])).side /
-                                                  std::sqrt(contact.quadrature) // as many points along a side, about
-                                            : edge / contact.quadrature;
+    const double apart = contact.on_surface
+                             ? measureOf(run.scene.rods[r], skinOf(run.scene.rods[r])).side /
+                                   std::sqrt(std::max(contact.quadrature, 1)) // as many points along a side, about
+                             : edge / contact.quadrature;
     for (const Collider &c : run.scene.colliders)
       if (const double across = 2 * (c.shape->depth() + contact.padding()); apart > across)
         notes.push_back("warning: rod '" + run.scene.rods[r].name + "' touches by points up to " + shortText(apart) +

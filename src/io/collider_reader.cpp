@@ -149,7 +149,9 @@ void readSettings(YamlMap &map, const ContactKeys &keys, ContactSettings &out) {
     out.stick = map.word(keys.stick) == "creep" ? ContactSettings::Stick::creep : ContactSettings::Stick::anchored;
   if (map.has(*keys.friction_at)) out.friction_at_surface = map.word(keys.friction_at) == "surface";
   if (map.has(*keys.quadrature))
-    out.quadrature = map.word(keys.quadrature) == "auto" ? 0 : std::stoi(map.word(keys.quadrature));
+    out.quadrature = map.word(keys.quadrature) == "auto"      ? 0
+                     : map.word(keys.quadrature) == "corners" ? ContactSettings::corners
+                                                              : std::stoi(map.word(keys.quadrature));
   auto refuse = [&](KeyOf<KeyType::number> key, const char *law) {
     if (map.has(*key)) map.at(*key).fail("'" + std::string(key->name()) + "' is for 'law: " + law + "'");
   };
@@ -187,7 +189,8 @@ void completeSurface(const YamlValue &block, Rod &rod) {
     block.fail(who +
                ", whose points no more than two edges may carry; take 'edges: 2' for its mesh, or a file with two");
   if (contact.quadrature == 0) contact.quadrature = 3;
-  if (contact.quadrature == 2) block.fail(who + ", which has 1, 3 or 6 points of a triangle for 'quadrature', not 2");
+  if (contact.quadrature == 2)
+    block.fail(who + ", which has 1, 3 or 6 points of a triangle or its corners for 'quadrature', not 2");
   if (!contact.friction_at_surface) block.fail(who + ", and 'friction_at: centreline' is for 'on: axis'");
   const Skin skin = skinOf(rod);
   try {
@@ -198,7 +201,9 @@ void completeSurface(const YamlValue &block, Rod &rod) {
   const double around = measureOf(rod, skin).area / rod.length(); // mean of its perimeter
   if (!contact.isBarrier() && contact.stiffness == 0) contact.stiffness = 1e9;
   contact.stiffness *= around;
-  if (std::isnan(contact.radius)) contact.radius = around / (2 * pi); // for rods, and the width of its law
+  if (std::isnan(contact.radius) && !rod.material.section) // for rods, and the width of its law
+    contact.radius = rod.skin->tube.sides > 0 ? std::max(rod.skin->tube.half_axes[0], rod.skin->tube.half_axes[1])
+                                              : around / (2 * pi);
 }
 
 } // namespace
@@ -324,6 +329,8 @@ void completeContact(const YamlValue &block, const Overrides &overrides, Scene &
       block.fail("rod '" + rod.name + "': the 'distance' of its contact, " + shortText(contact.distance) +
                  " m, must not exceed its radius, " + shortText(contact.radius) + " m");
     if (!contact.isBarrier() && contact.stiffness == 0) contact.stiffness = 1e9;
+    if (!contact.on_surface && contact.quadrature == ContactSettings::corners)
+      block.fail("rod '" + rod.name + "' has 'quadrature: corners', those of triangles, which are for 'on: surface'");
     if (!contact.on_surface && contact.quadrature == 6)
       block.fail("rod '" + rod.name + "' has 6 points of a triangle for 'quadrature', which is for 'on: surface'");
     if (contact.touchesRods() && !one) one = &rod;

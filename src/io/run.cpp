@@ -272,6 +272,7 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
     std::vector<std::string> inputs = files.files();
     inputs.insert(inputs.end(), prepared.source.paths.begin(), prepared.source.paths.end());
     begun.folder->refuseToReplace(inputs);
+    inputs.push_back(o.restart);
     checkShapesPath(o.output_shapes, inputs, o.output_dir);
   });
   if (o.accuracy) meetAccuracy(prepared, o, &begun.choice);

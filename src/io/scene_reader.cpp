@@ -120,7 +120,10 @@ void readDirectors(YamlMap &map, const std::vector<Vec3> &of_file, Rod &rod) {
     return;
   }
   Vec3 start = Vec3::Zero();
-  if (!of_file.empty() && int(of_file.size()) == rod.edges()) {
+  if (!of_file.empty()) {
+    if (int(of_file.size()) != rod.edges())
+      map.value().fail("the file has directors of " + std::to_string(of_file.size()) + " edges, and the rod has " +
+                       std::to_string(rod.edges()) + "; close it in the file, or write 'directors'");
     if (map.has("rods[].director"))
       map.at("rods[].director").fail("the file has directors of its own; take 'director' away, or write 'directors'");
     for (int i = 0; i < rod.edges(); ++i) { // what is normal to rounding stays as it is
@@ -207,7 +210,7 @@ void addRod(YamlMap &map, Rod rod, const Polyline &shape, const Vec3 &shift, dou
   if (shape.curve && !by_one_more_edge)
     drawing.curve = [curve = shape.curve, shift](double s) { return Vec3(curve(s) + shift); };
   if (shape.skin && !map.has("rods[].skin"))
-    giveSkin(shape.skin, rod);
+    giveSkin(map, shape.skin, rod, out);
   else
     putSkin(map, skin, shift, rod, out);
   out.names.add(rod.name);

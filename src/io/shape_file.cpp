@@ -49,9 +49,9 @@ public:
       return table;
     }
     const std::optional<YAML::Node> node = nodeOf(name);
-    if (!node || !node->IsSequence()) throw SceneError(path_ + ": has no table '" + name + "'");
+    if (!node || node->IsMap() || node->IsNull()) throw SceneError(path_ + ": has no table '" + name + "'");
     add(*node, name, table.values);
-    table.rows = node->size();
+    table.rows = node->IsSequence() ? node->size() : 1;
     return table;
   }
   /// One whose rows have so many numbers.
@@ -291,7 +291,7 @@ std::vector<Polyline> readShapes(const std::string &path) {
         line.directors.push_back(a);
       }
   }
-  if (tables.has("skins/triangles")) readSkins(tables, lines);
+  if (tables.has("skins/triangles") || tables.has("skins/edge")) readSkins(tables, lines);
   return lines;
 }
 

@@ -74,6 +74,29 @@ double leastRadius(const Rod &rod) {
   return least;
 }
 
+/// What pictures show and users may not expect. \param at file and line
+void tellOfSkin(const std::string &at, const Rod &rod, SceneFile &out) {
+  const std::string place = "warning: " + at + ": the skin of rod '" + rod.name + "' ";
+  const double widest = std::max(rod.skin->tube.half_axes[0], rod.skin->tube.half_axes[1]), least = leastRadius(rod);
+  if (widest > 0.5 * least)
+    out.notes.push_back(place + "is wider than half the radius of its tightest bend, " + shortText(least) +
+                        " m, and may overlap itself");
+  if (!rod.skin->mesh) return;
+  const Skin skin = skinOf(rod);
+  if (const double turn = widestTurn(rod, skin) * 180 / pi; turn > 30)
+    out.notes.push_back(place + "shrinks where edges turn by " + shortText(turn) +
+                        " degrees, by the cosine of half of that; take more edges");
+  try {
+    checkClosed(rod, skin);
+  } catch (const std::invalid_argument &e) {
+    out.notes.push_back(place + "encloses no solid: " + e.what() +
+                        "; pictures have it, 'contact: {on: surface}' refuses it");
+  }
+  if (const double far = farthestOverMedian(skin); far > 10)
+    out.notes.push_back(place + "has points " + shortText(far) +
+                        " times as far from it as most: is the mesh where the rod is?");
+}
+
 } // namespace
 
 SkinRecipe readSkin(YamlMap &rod, int shapes, const Material &material) {
@@ -92,16 +115,17 @@ SkinRecipe readSkin(YamlMap &rod, int shapes, const Material &material) {
   return skin;
 }
 
-void giveSkin(const std::shared_ptr<const Skin> &skin, Rod &rod) {
+void giveSkin(const YamlMap &map, const std::shared_ptr<const Skin> &skin, Rod &rod, SceneFile &out) {
   auto recipe = std::make_shared<SkinRecipe>();
   auto mesh = std::make_shared<TriangleMesh>();
   for (const SkinPoint &point : skin->points) mesh->vertices.push_back(placeOf(rod, point));
   mesh->triangles = skin->triangles;
   recipe->mesh = mesh;
-  recipe->edges = skin->width();
+  recipe->edges = std::max(2, skin->width()); // as points between its corners go with edges
   recipe->given = skin;
   recipe->given_edges = rod.edges();
   rod.skin = recipe;
+  tellOfSkin(map.value().place(), rod, out);
 }
 
 void putSkin(YamlMap &map, const SkinRecipe &recipe, const Vec3 &shift, Rod &rod, SceneFile &out) {
@@ -113,25 +137,7 @@ void putSkin(YamlMap &map, const SkinRecipe &recipe, const Vec3 &shift, Rod &rod
     own->mesh = mesh;
   }
   rod.skin = own;
-  const std::string place = "warning: " + map.at("rods[].skin").place() + ": the skin of rod '" + rod.name + "' ";
-  const double widest = std::max(recipe.tube.half_axes[0], recipe.tube.half_axes[1]), least = leastRadius(rod);
-  if (widest > 0.5 * least)
-    out.notes.push_back(place + "is wider than half the radius of its tightest bend, " + shortText(least) +
-                        " m, and may overlap itself");
-  if (!own->mesh) return;
-  const Skin skin = skinOf(rod);
-  if (const double turn = widestTurn(rod, skin) * 180 / pi; turn > 30)
-    out.notes.push_back(place + "shrinks where edges turn by " + shortText(turn) +
-                        " degrees, by the cosine of half of that; take more edges");
-  try {
-    checkClosed(rod, skin);
-  } catch (const std::invalid_argument &e) {
-    out.notes.push_back(place + "encloses no solid: " + e.what() +
-                        "; pictures have it, 'contact: {on: surface}' refuses it");
-  }
-  if (const double far = farthestOverMedian(skin); far > 10)
-    out.notes.push_back(place + "has points " + shortText(far) +
-                        " times as far from it as most: is the mesh where the rod is?");
+  tellOfSkin(map.at("rods[].skin").place(), rod, out);
 }
 
 } // namespace tendril

@@ -284,7 +284,7 @@ rows = [
     ("surface of a rod's own contact without a skin", ("density: 1000}\n" + "supports:\n" + support, "density: 1000}\n    contact: {on: surface}\nsupports:\n" + support + "\ncolliders: [{plane: {}, position: [0, -1, 0]}]"), [], ["scene.yaml:", "touches by its surface, and has none"]),
     ("surface of no kind", (support, support + "\ncontact: {on: skin}\ncolliders: [{plane: {}, position: [0, -1, 0]}]"), [], ["scene.yaml:9", "axis", "surface"]),
     ("surface of a cable", ("density: 1000}\n" + "supports:\n" + support, "density: 1000, flexural_stiffness: 0}\n    skin: {tube: {}}\nsupports:\n  - {vertex: 0, type: pin}\ncontact: {on: surface}\ncolliders: [{plane: {}, position: [0, -1, 0]}]"), [], ["scene.yaml:", "is a cable", "take 'on: surface' away"]),
-    ("surface by two points", surface(keys=", quadrature: 2"), [], ["scene.yaml:", "1, 3 or 6 points of a triangle for 'quadrature', not 2"]),
+    ("surface by two points", surface(keys=", quadrature: 2"), [], ["scene.yaml:", "1, 3 or 6 points of a triangle or its corners for 'quadrature', not 2"]),
     ("six points of an edge", (support, support + "\ncontact: {quadrature: 6}\ncolliders: [{plane: {}, position: [0, -1, 0]}]"), [], ["scene.yaml:", "6 points of a triangle for 'quadrature', which is for 'on: surface'"]),
     ("surface that is open", surface("{mesh: {file: open.obj}}"), [], ["scene.yaml:", "rod 'a' touches by its surface", "edge"]),
     ("surface that is inside out", surface("{mesh: {file: inside_out.obj}}"), [], ["scene.yaml:", "rod 'a' touches by its surface", "inside out"]),

@@ -193,7 +193,7 @@ std::array<Vec3, 2> actionOf(const Scene &scene, const Simulation &sim) {
 }
 
 TEST(SurfaceContact, DerivativesAreThoseOfTheEnergy) {
-  for (const int points : {1, 3, 6}) {
+  for (const int points : {1, 3, 6, ContactSettings::corners}) {
     Scene scene = onPlane(8, 0.5, 0.3, 8);
     scene.rods[0].contact.quadrature = points;
     scene.colliders.push_back(solid(makeSphere(0.02), Vec3(0.12, 0.0252, 0.004)));
@@ -368,6 +368,51 @@ TEST(SurfaceContact, NewtonIsQuadraticWithTheExactHessian) {
   }
   EXPECT_LE(most[HessianKind::exact], 6);
   EXPECT_GT(most[HessianKind::gauss_newton], 12);
+}
+
+/// A cube of twelve triangles about a short rod falls on its lowest corner: no corner passes the barrier where they are
+/// what touches; points within triangles are as much as a sixth of two sides away from them.
+TEST(SurfaceContact, CornersDoNotSink) {
+  for (const int points : {3, ContactSettings::corners}) {
+    Scene scene = onPlane(0, 0, 0);
+    Rod &rod = scene.rods[0];
+    rod.position = lineShape(Vec3(-0.004, 0, 0.03), Vec3(0.004, 0.001, 0.031), 2).points;
+    setBishopDirectors(rod);
+    auto mesh = std::make_shared<TriangleMesh>();
+    const Mat3 turn = Eigen::AngleAxisd(0.7, Vec3(1, 2, 0.5).normalized()).toRotationMatrix();
+    for (int k = 0; k < 8; ++k)
+      mesh->vertices.push_back(turn * (0.01 * Vec3(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1)) +
+                               Vec3(0, 0, 0.0305));
+    mesh->triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
+                       {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+    SkinRecipe recipe;
+    recipe.mesh = mesh;
+    rod.skin = std::make_shared<SkinRecipe>(recipe);
+    rod.contact.on_surface = true;
+    rod.contact.quadrature = points;
+    rod.contact.friction = 0.5;
+    Simulation sim;
+    double lowest = 1;
+    const LoopSettings settings = dynamics(1e-3, 0.4);
+    EXPECT_PETSC(sim.setUp(scene, settings));
+    TimeLoop loop(sim.solver, settings);
+    bool finished = false;
+    EXPECT_PETSC(loop.run(
+        sim.state,
+        [&](const State &state, const Diagnostics &) {
+          Rod now = scene.rods[0];
+          now.position = state.position;
+          now.director = state.director;
+          for (const SkinPoint &p : skinOf(scene.rods[0]).points) lowest = std::min(lowest, placeOf(now, p)[2]);
+          return PetscErrorCode(0);
+        },
+        &finished));
+    EXPECT_TRUE(finished) << loop.failure();
+    if (points == ContactSettings::corners)
+      EXPECT_GT(lowest, -0.5 * rod.contact.distance);
+    else
+      EXPECT_LT(lowest, -1e-3);
+  }
 }
 
 /// The same ring, with its vertices counted from another one: what carries samples over the end is as all others.

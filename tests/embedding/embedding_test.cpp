@@ -179,6 +179,9 @@ TEST(SkinSamples, SumToTheAreaAndStayWhereTheyAreDrawn) {
                            : tube(helixShape({Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY(), 1, 0.1, 2, 0, 30}), 8, 0.02);
     const Skin skin = skinOf(rod);
     const SkinMeasure whole = measureOf(rod, skin);
+    double of_corners = 0;
+    for (const SkinSample &s : skinSamples(rod, skin, ContactSettings::corners, 2)) of_corners += s.area;
+    EXPECT_NEAR(of_corners, whole.area, 1e-13);
     for (const int points : {1, 3, 6}) {
       double area = 0, volume = 0;
       int last = -1;

@@ -76,7 +76,7 @@ public:
   /// Whether a vertex that goes by so much from where it was looked at last may reach an obstacle.
   bool mayMeet(int vertex, int collider, double way) const {
     const int chunk = std::min(vertex / chunk_edges, chunks() - 1);
-    return away_[chunk * int(scene_.colliders.size()) + collider] < way;
+    return away_[chunk * int(scene_.colliders.size()) + collider] < skin_.gain() * way;
   }
   /// Smallest distance of samples from obstacles, between surfaces [m].
   double smallestGap(const Configuration &c) const;

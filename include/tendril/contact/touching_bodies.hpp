@@ -129,6 +129,7 @@ private:
   std::vector<SkinSamples> skins_; ///< per rod
   /// How far samples of a rod are at most from the middle of their edge, beyond half of it [m].
   double aboutAxis(int rod, const Configuration &c) const;
+  double aboutEdge(int rod, int edge, const Configuration &c) const; ///< the same of one edge of a skin
   const std::vector<BodySample> &samplesOf(int body) const { return solids_[std::size_t(body)].samples; }
   Side sideOf(const TouchingPair &p, int side, const Collider::Pose &pose, const Configuration &c) const;
   /// Whether none of it is within reach of the other.

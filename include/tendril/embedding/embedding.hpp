@@ -29,6 +29,7 @@ struct SkinSample {
 /// corners: 1 (the middle), 3 (of degree 2) or 6 of each (of degree 4; D. A. Dunavant, High degree efficient
 /// symmetrical Gaussian quadrature rules for the triangle, Int. J. Numer. Meth. Eng. 21, 1985). In the order of their
 /// first edges.
+/// Or, with points -1, the corners as they are, each with a third of its triangles.
 std::vector<SkinSample> skinSamples(const Rod &rod, const Skin &skin, int points, int edges);
 
 /// Area [m^2] of a skin as drawn, the volume in it where it is closed [m^3], and the longest side of a triangle [m].

@@ -55,8 +55,9 @@ namespace tendril {
   {block ".normal_damping", KeyType::number, "s/m", "0",                                                               \
    "Hunt and Crossley's: of the normal force, by the velocity normal to the surface", not_negative, "", "0.1"},        \
   {block ".quadrature", KeyType::word, "", "auto",                                                                     \
-   "points of an edge that touch: as the obstacle's curvature asks, or so many Gauss points; or 1, 3, 6 of a triangle", \
-   anything, "auto|1|2|3|6", "3"}
+   "points of an edge that touch: as the obstacle's curvature asks, or so many Gauss points; on: surface 1, 3 or 6 "    \
+   "of each triangle, or its corners",                                                                                 \
+   anything, "auto|1|2|3|6|corners", "3"}
 // clang-format on
 
 inline constexpr Key scene_keys[] = {
@@ -108,8 +109,9 @@ inline constexpr Key scene_keys[] = {
      "[[0, 0, 0], [1, 0, 0], [1, 1, 0]]"},
     {"rods[].file", KeyType::file, "m", "(another shape)",
      "polylines: .csv/.txt (a point a line, # begins a comment, an empty line ends a rod), .obj (l elements; those "
-     "that share a vertex are one rod, closed when it ends where it began), .h5 "
-     "(position (n, 3), rod_vertex_offsets (rods + 1), closed (rods)); the path is relative to the scene"},
+     "that share a vertex are one rod, closed when it ends where it began), .h5 or .json "
+     "(position (n, 3), rod_vertex_offsets (rods + 1), closed (rods), directors and skins); the path is relative to "
+     "the scene"},
     {"rods[].place", KeyType::map, "", "(as drawn)",
      "where the shape is put: scaled about the origin, turned about it, then moved"},
     {"rods[].place.scale", KeyType::number, "", "1", "factor of all coordinates", positive, "", "0.001"},

@@ -12,6 +12,6 @@ SkinRecipe readSkin(YamlMap &rod, int shapes, const Material &material);
 /// Gives it to a rod that is drawn. \param shift of the rod from where its block has drawn it [m]
 void putSkin(YamlMap &map, const SkinRecipe &skin, const Vec3 &shift, Rod &rod, SceneFile &out);
 /// Gives it one that a file has for it as it is drawn.
-void giveSkin(const std::shared_ptr<const Skin> &skin, Rod &rod);
+void giveSkin(const YamlMap &map, const std::shared_ptr<const Skin> &skin, Rod &rod, SceneFile &out);
 
 } // namespace tendril

@@ -54,6 +54,7 @@ struct ContactSettings {
   std::uint64_t apart_from = 0, apart_to = 0;
   /// Gauss points of an edge; 0: vertices, and points between where obstacles curve. On a skin, those of a triangle.
   int quadrature = 0;
+  static constexpr int corners = -1; ///< of `quadrature`: the corners of triangles
 
   static ContactSettings none() {
     ContactSettings settings;

@@ -16,7 +16,7 @@ struct SkinPoint {
   int edges = 0; ///< how many carry it
   std::array<int, most> edge{};
   std::array<double, most> weight{};
-  std::array<Vec3, most> local{}; ///< [m]
+  std::array<Vec3, most> local{Vec3::Zero(), Vec3::Zero(), Vec3::Zero()}; ///< [m]
   void add(int to_edge, double by, const Vec3 &at) {
     edge[std::size_t(edges)] = to_edge;
     weight[std::size_t(edges)] = by;
