@@ -1,19 +1,12 @@
 #include "tendril/embedding/embedding.hpp"
 
 #include <algorithm>
-#include <numeric>
 #include <stdexcept>
 
 namespace tendril {
 namespace {
 
-/// Where a rod as drawn comes nearest to a point.
-struct OnRod {
-  int edge = 0;
-  double squared = HUGE_VAL;
-};
-
-/// The polyline of a rod as drawn, in chunks with balls about them.
+/// The edge of a rod as drawn that is nearest to a point, by chunks with balls about them.
 class Nearest {
 public:
   explicit Nearest(const Rod &rod) : rod_(rod) {
@@ -26,20 +19,20 @@ public:
           ball.radius = std::max(ball.radius, (rod.position[std::size_t(v)] - ball.middle).norm());
     }
   }
-  OnRod on(const Vec3 &y) const {
-    OnRod best;
+  int to(const Vec3 &y) const {
+    Found best;
     for (int k = 0; k < int(balls_.size()); ++k) {
       const double apart = (y - balls_[std::size_t(k)].middle).norm() - balls_[std::size_t(k)].radius;
       if (apart > 0 && apart * apart > best.squared) continue;
       for (int e = k * chunk; e < std::min((k + 1) * chunk, rod_.edges()); ++e) take(y, e, best);
     }
-    return best;
+    return best.edge;
   }
   /// Among so many edges from one on.
-  OnRod on(const Vec3 &y, int first, int count) const {
-    OnRod best;
+  int to(const Vec3 &y, int first, int count) const {
+    Found best;
     for (int k = 0; k < count; ++k) take(y, (first + k) % rod_.edges(), best);
-    return best;
+    return best.edge;
   }
 
 private:
@@ -48,10 +41,14 @@ private:
     Vec3 middle;
     double radius = 0;
   };
+  struct Found {
+    int edge = 0;
+    double squared = HUGE_VAL;
+  };
   const Rod &rod_;
   std::vector<Ball> balls_;
 
-  void take(const Vec3 &y, int edge, OnRod &best) const {
+  void take(const Vec3 &y, int edge, Found &best) const {
     const Vec3 &from = rod_.position[std::size_t(edge)], e = rod_.edge(edge);
     const double part = std::clamp((y - from).dot(e) / e.squaredNorm(), 0.0, 1.0);
     const double squared = (y - from - part * e).squaredNorm();
@@ -182,8 +179,7 @@ Skin embedded(const Rod &rod, const TriangleMesh &mesh, int edges) {
   const Nearest nearest(rod);
   Skin skin;
   skin.triangles = mesh.triangles;
-  for (const Vec3 &y : mesh.vertices)
-    skin.points.push_back(carried({rod, 0, rod.edges()}, y, nearest.on(y).edge, edges));
+  for (const Vec3 &y : mesh.vertices) skin.points.push_back(carried({rod, 0, rod.edges()}, y, nearest.to(y), edges));
   return skin;
 }
 
@@ -231,7 +227,7 @@ std::vector<SkinSample> skinSamples(const Rod &rod, const Skin &skin, int points
     const double area = 0.5 * (x[1] - x[0]).cross(x[2] - x[0]).norm();
     for (const RulePoint &p : rule) {
       const Vec3 y = p.at[0] * x[0] + p.at[1] * x[1] + p.at[2] * x[2];
-      samples.push_back({carried({rod, first, count}, y, nearest.on(y, first, count).edge, edges), p.weight * area});
+      samples.push_back({carried({rod, first, count}, y, nearest.to(y, first, count), edges), p.weight * area});
     }
   }
   sortByEdges(samples);

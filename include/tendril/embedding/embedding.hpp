@@ -10,9 +10,10 @@ namespace tendril {
 /// A tube about a rod as drawn: of n edges and S sides, S (n + 2) + 2 points and 2 S (n + 2) triangles with its caps,
 /// or S n and 2 S n about a ring.
 Skin tubeAbout(const Rod &rod, const SkinRecipe::Tube &tube);
-/// A mesh about a rod as drawn. The edges that carry a point are those beside the nearest point of the polyline: that
-/// edge (1), the two whose middles are on both sides of it, linear in arc length (2), or three by a quadratic B-spline.
-/// Beyond the ends it is the last edge alone. Near in space counts once only: the rest goes along the rod.
+/// A mesh about a rod as drawn. A point is at a part of the nearest edge, between the planes that halve the angles with
+/// its neighbours. It is carried by that edge (1), by the two whose middles are on both sides of it, linear from one to
+/// the other (2), or by three with the weights of a quadratic B-spline; beyond the ends by the last edge alone. Near in
+/// space counts once only: the rest goes along the rod.
 Skin embedded(const Rod &rod, const TriangleMesh &mesh, int edges);
 /// All of a rod; nothing where it has none.
 Skin skinOf(const Rod &rod);
@@ -27,9 +28,9 @@ struct SkinSample {
 };
 /// Points of the triangles by which a surface is integrated, each carried by itself by those edges that carry the
 /// corners: 1 (the middle), 3 (of degree 2) or 6 of each (of degree 4; D. A. Dunavant, High degree efficient
-/// symmetrical Gaussian quadrature rules for the triangle, Int. J. Numer. Meth. Eng. 21, 1985). In the order of their
-/// first edges.
-/// Or, with points -1, the corners as they are, each with a third of its triangles.
+/// symmetrical Gaussian quadrature rules for the triangle, Int. J. Numer. Meth. Eng. 21, 1985). Or the corners as they
+/// are, each with a third of its triangles. In the order of their first edges.
+/// \param points of a triangle, or ContactSettings::corners \param edges most that carry a point, 1 or 2
 std::vector<SkinSample> skinSamples(const Rod &rod, const Skin &skin, int points, int edges);
 
 /// Area [m^2] of a skin as drawn, the volume in it where it is closed [m^3], and the longest side of a triangle [m].
