@@ -61,7 +61,7 @@ Scene pressedScene(bool on_skin = false) {
   for (Body &body : scene.bodies) {
     body.contact.stiffness = 10;
     body.contact.friction = 0.2;
-    body.rod = body.name == "drum" ? 1 : body.name == "below" ? 2 : 0;
+    body.rod = body.name == "drum" || body.name == "crate" ? 1 : body.name == "below" ? 2 : 0;
   }
   return scene;
 }
