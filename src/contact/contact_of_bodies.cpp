@@ -162,22 +162,33 @@ private:
     return by;
   }
 
+  /// Of weight W(distance) by the place of a sample as the solid sees it, and from its centre of mass to there [m].
+  struct Push {
+    Vec3 gradient, arm;
+    Mat3 hessian;
+  };
+  Push pushOn(const TouchingPair &p, const TouchingSolid &t, const Configuration &c, bool exact) const {
+    const int solid = p.body(t.solid());
+    const Mat3 q = bodies_.poseOf(solid, c).rotation;
+    const Distance distance = bodies_.solidOf(solid).at(t.local);
+    const GapLaw law = bodies_.lawOf(p)(t.gap);
+    const Vec3 normal = q * distance.gradient;
+    Push push{t.weight * law.slope * normal, armTo(p, t, c), t.weight * law.curvature * normal * normal.transpose()};
+    if (exact) push.hessian += t.weight * law.slope * (q * distance.hessian * q.transpose());
+    return push;
+  }
+
   /// Derivatives of weight W(distance) of u = exp(-d)(x - p), the place of the sample as the solid sees it, which turns
   /// by d about p: of second order g.u has what x does, that of the arm x - p, and -d x (dx - dp).
   void addNormal(const TouchingPair &p, const TouchingSolid &t, const Configuration &c, HessianKind kind,
                  OfPair &d) const {
     const int own = OfPair::half * t.side, other = OfPair::half * t.solid();
-    const Mat3 q = bodies_.poseOf(p.body(t.solid()), c).rotation;
-    const Distance distance = bodies_.solidOf(p.body(t.solid())).at(t.local);
-    const GapLaw law = bodies_.lawOf(p)(t.gap);
-    const Vec3 normal = q * distance.gradient, g = t.weight * law.slope * normal, arm = armTo(p, t, c);
+    const bool exact = kind != HessianKind::gauss_newton;
+    const auto [g, arm, h] = pushOn(p, t, c, exact);
     Eigen::Matrix<double, 3, OfPair::size> by;
     by << bySide(p, t, 0, arm, c), bySide(p, t, 1, arm, c);
     d.gradient += by.transpose() * g;
     if (kind == HessianKind::none) return;
-    Mat3 h = t.weight * law.curvature * normal * normal.transpose();
-    const bool exact = kind != HessianKind::gauss_newton;
-    if (exact) h += t.weight * law.slope * (q * distance.hessian * q.transpose());
     d.hessian += by.transpose() * h * by;
     if (!exact) return;
     addCurvature(p, t.side, bodies_.pointOf(p, t), g, c, d);
@@ -198,23 +209,15 @@ private:
   void addNormalOnSkin(const TouchingPair &p, const TouchingSolid &t, const Configuration &c, HessianKind kind,
                        OfPair &d, Derivatives &out) const {
     const int other = OfPair::half * t.solid();
-    const Mat3 q = bodies_.poseOf(p.body(t.solid()), c).rotation;
-    const Distance distance = bodies_.solidOf(p.body(t.solid())).at(t.local);
-    const GapLaw law = bodies_.lawOf(p)(t.gap);
-    const Vec3 normal = q * distance.gradient, g = t.weight * law.slope * normal, arm = armTo(p, t, c);
     const bool exact = kind != HessianKind::gauss_newton;
-    OnSkinOfPair on{t.skin->point, g, t.weight * law.curvature * normal * normal.transpose(),
-                    bySide(p, t, t.solid(), arm, c)};
-    if (exact) {
-      on.hessian += t.weight * law.slope * (q * distance.hessian * q.transpose());
-      on.turned.middleCols<3>(3) = -crossMatrix<double>(g);
-    }
+    const auto [g, arm, h] = pushOn(p, t, c, exact);
+    OnSkinOfPair on{t.skin->point, g, h, bySide(p, t, t.solid(), arm, c)};
+    if (exact) on.turned.middleCols<3>(3) = -crossMatrix<double>(g);
     on.number = numbersOf(p);
     addOnSkin(elements_, p, t.side, on, c, kind, out);
     d.gradient.segment<OfPair::half>(other) += on.by_body.transpose() * g;
     if (kind == HessianKind::none) return;
-    OfPair::BySide more = on.hessian * on.by_body;
-    Eigen::Matrix<double, OfPair::half, OfPair::half> own = on.by_body.transpose() * more;
+    Eigen::Matrix<double, OfPair::half, OfPair::half> own = on.by_body.transpose() * h * on.by_body;
     if (exact) {
       own.block<3, 3>(3, 3) += curvatureOfArm(g, arm);
       own.block<3, 3>(0, 3) += crossMatrix<double>(g); // of its centre of mass and its spin

@@ -7,19 +7,8 @@
 namespace tendril {
 namespace {
 
-using ByEdge = Eigen::Matrix<double, 3, edge_size>;
-
 /// Where the frame of an edge has taken an arm.
 Vec3 turned(const CarriedPoint &point, const Frame &frame) { return matrixOf(frame) * point.arm; }
-
-/// What moves at e + arm by the edge's vector and twist.
-ByEdge byEdge(const CarriedPoint &point, const Frame &frame) {
-  ByEdge spin;
-  spin << crossMatrix(frame.tangent) / frame.length, frame.tangent;
-  ByEdge by = -crossMatrix(turned(point, frame)) * spin;
-  by.leftCols<3>() += point.at * Mat3::Identity();
-  return by;
-}
 
 /// Of the whole point by the edges that carry it, with the vertex where the first begins: weights sum to one, and the
 /// second begins where the first ends.
@@ -47,7 +36,29 @@ void addOnAxis(double at, int slot, int next, const Vec3 &gradient, const Mat3 &
     }
 }
 
+/// spread() of a point off the axis. \param by byEdges
+void spreadOff(const EdgePoint &point, const std::array<ByEdge, 2> &by, const Vec3 &value, Planes &out) {
+  for (int a = 0; a < 3; ++a) out[a][point.slot()] += value[a];
+  for (std::size_t k = 0; k < std::size_t(point.edges); ++k) {
+    const int edge = point.by[k].slot;
+    const Eigen::Vector4d d = by[k].transpose() * value;
+    for (int a = 0; a < 3; ++a) {
+      out[a][edge] -= d[a];
+      out[a][point.by[k].next] += d[a];
+    }
+    out[3][edge] += d[3];
+  }
+}
+
 } // namespace
+
+ByEdge byEdge(const CarriedPoint &point, const Frame &frame) {
+  ByEdge spin;
+  spin << crossMatrix(frame.tangent) / frame.length, frame.tangent;
+  ByEdge by = -crossMatrix(turned(point, frame)) * spin;
+  by.leftCols<3>() += point.at * Mat3::Identity();
+  return by;
+}
 
 Vec3 placeOf(const EdgePoint &point, const Configuration &c) {
   Vec3 y = Vec3::Zero();
@@ -78,24 +89,10 @@ Vec3 motionOf(const EdgePoint &point, const Configuration &c, const Planes &incr
 }
 
 void spread(const EdgePoint &point, const Vec3 &value, const Configuration &c, Planes &out) {
-  const int slot = point.slot();
-  if (point.isOnAxis()) {
-    for (int a = 0; a < 3; ++a) {
-      out[a][slot] += (1 - point.by[0].point.at) * value[a];
-      out[a][point.by[0].next] += point.by[0].point.at * value[a];
-    }
-    return;
-  }
-  const std::array<ByEdge, 2> by = byEdges(point, c);
-  for (int a = 0; a < 3; ++a) out[a][slot] += value[a];
-  for (std::size_t k = 0; k < std::size_t(point.edges); ++k) {
-    const int edge = point.by[k].slot;
-    const Eigen::Vector4d d = by[k].transpose() * value;
-    for (int a = 0; a < 3; ++a) {
-      out[a][edge] -= d[a];
-      out[a][point.by[k].next] += d[a];
-    }
-    out[3][edge] += d[3];
+  if (!point.isOnAxis()) return spreadOff(point, byEdges(point, c), value, out);
+  for (int a = 0; a < 3; ++a) {
+    out[a][point.slot()] += (1 - point.by[0].point.at) * value[a];
+    out[a][point.by[0].next] += point.by[0].point.at * value[a];
   }
 }
 
@@ -103,9 +100,9 @@ void addAt(const EdgePoint &point, const Vec3 &gradient, const Mat3 &hessian, bo
            const BlockPlanes *blocks, Derivatives &out) {
   if (point.isOnAxis())
     return addOnAxis(point.by[0].point.at, point.slot(), point.by[0].next, gradient, hessian, blocks, out);
-  spread(point, gradient, c, out.equilibrium);
-  if (!blocks) return;
   const std::array<ByEdge, 2> by = byEdges(point, c);
+  spreadOff(point, by, gradient, out.equilibrium);
+  if (!blocks) return;
   const int slot = point.slot();
   for (int a = 0; a < 3; ++a)
     for (int b = a; b < 3; ++b) blocks->vertex(a, b)[slot] += hessian(a, b);

@@ -49,18 +49,13 @@ Vec3 wayBetween(const TouchingPair &p, int side, const CarriedPoint &own, const 
 
 /// An edge has y = x + s e + o with the arm o turned by its spin, a body y = p + o.
 OfPair::BySide byPoint(const TouchingPair &p, int side, const CarriedPoint &point, const Configuration &c) {
-  const Vec3 arm = armOf(p, side, point, c);
   OfPair::BySide by;
   if (p.isBody(side)) {
-    by << Mat3::Identity(), -crossMatrix<double>(arm), Vec3::Zero();
+    by << Mat3::Identity(), -crossMatrix<double>(armOf(p, side, point, c)), Vec3::Zero();
     return by;
   }
-  const Frame frame = c.frameAt(p.slot[std::size_t(2 * side)]);
-  Eigen::Matrix<double, 3, 4> spin; // of the edge, by its vector and twist
-  spin << crossMatrix(frame.tangent) / frame.length, frame.tangent;
-  const Eigen::Matrix<double, 3, 4> turned = -crossMatrix(arm) * spin;
-  const Mat3 by_edge = point.at * Mat3::Identity() + turned.leftCols<3>();
-  by << Mat3::Identity() - by_edge, by_edge, turned.col(3);
+  const ByEdge edge = byEdge(point, c.frameAt(p.slot[std::size_t(2 * side)]));
+  by << Mat3::Identity() - edge.leftCols<3>(), edge;
   return by;
 }
 

@@ -8,7 +8,7 @@ namespace tendril {
 
 SkinSamples::SkinSamples(const Rod &rod, const RodRange &range) : first_(std::size_t(rod.edges() + 1), 0) {
   const Skin skin = skinOf(rod);
-  const double around = measureOf(rod, skin).area / rod.length();
+  const double around = perimeterOf(rod, skin);
   for (const SkinSample &s : skinSamples(rod, skin, rod.contact.quadrature, std::min(rod.skin->edges, 2))) {
     OnSkin &sample = samples_.emplace_back();
     sample.point.edges = s.point.edges;

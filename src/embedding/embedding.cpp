@@ -143,12 +143,13 @@ void sortByEdges(std::vector<SkinSample> &samples) {
                    [](const SkinSample &a, const SkinSample &b) { return a.point.edge[0] < b.point.edge[0]; });
 }
 
+double areaOf(const Vec3 &a, const Vec3 &b, const Vec3 &c) { return 0.5 * (b - a).cross(c - a).norm(); }
+
 std::vector<SkinSample> cornerSamples(const std::vector<Vec3> &places, const Skin &skin) {
   std::vector<SkinSample> samples;
   for (const SkinPoint &point : skin.points) samples.push_back({point, 0});
   for (const auto &[a, b, c] : skin.triangles) {
-    const Vec3 &from = places[std::size_t(a)];
-    const double area = 0.5 * (places[std::size_t(b)] - from).cross(places[std::size_t(c)] - from).norm();
+    const double area = areaOf(places[std::size_t(a)], places[std::size_t(b)], places[std::size_t(c)]);
     for (const int corner : {a, b, c}) samples[std::size_t(corner)].area += area / 3;
   }
   std::erase_if(samples, [](const SkinSample &s) { return s.area == 0; }); // of no triangle
@@ -224,7 +225,7 @@ std::vector<SkinSample> skinSamples(const Rod &rod, const Skin &skin, int points
     }
     const int count = std::min(last - first + 1, n);
     first = (from + first + n) % n;
-    const double area = 0.5 * (x[1] - x[0]).cross(x[2] - x[0]).norm();
+    const double area = areaOf(x[0], x[1], x[2]);
     for (const RulePoint &p : rule) {
       const Vec3 y = p.at[0] * x[0] + p.at[1] * x[1] + p.at[2] * x[2];
       samples.push_back({carried({rod, first, count}, y, nearest.to(y, first, count), edges), p.weight * area});
@@ -239,12 +240,14 @@ SkinMeasure measureOf(const Rod &rod, const Skin &skin) {
   SkinMeasure sum;
   for (const auto &[a, b, c] : skin.triangles) {
     const Vec3 from = x[std::size_t(a)] - x[0], to = x[std::size_t(b)] - x[0], last = x[std::size_t(c)] - x[0];
-    sum.area += 0.5 * (to - from).cross(last - from).norm();
+    sum.area += areaOf(from, to, last);
     sum.volume += from.dot(to.cross(last)) / 6;
     sum.side = std::max({sum.side, (to - from).norm(), (last - to).norm(), (from - last).norm()});
   }
   return sum;
 }
+
+double perimeterOf(const Rod &rod, const Skin &skin) { return measureOf(rod, skin).area / rod.length(); }
 
 void checkClosed(const Rod &rod, const Skin &skin) { (void)MeshDistance({placesOf(rod, skin), skin.triangles}); }
 

@@ -1,7 +1,7 @@
 #include "tendril/io/collider_reader.hpp"
 
 #include "tendril/embedding/embedding.hpp"
-
+#include "tendril/geometry/rotation.hpp"
 #include "tendril/io/mesh_reader.hpp"
 #include "tendril/io/support_reader.hpp"
 #include "tendril/io/text.hpp"
@@ -198,7 +198,7 @@ void completeSurface(const YamlValue &block, Rod &rod) {
   } catch (const std::invalid_argument &e) {
     block.fail(who + ": " + e.what());
   }
-  const double around = measureOf(rod, skin).area / rod.length(); // mean of its perimeter
+  const double around = perimeterOf(rod, skin);
   if (!contact.isBarrier() && contact.stiffness == 0) contact.stiffness = 1e9;
   contact.stiffness *= around;
   if (std::isnan(contact.radius) && !rod.material.section) // for rods, and the width of its law
@@ -369,8 +369,7 @@ void readCollider(const YamlValue &value, Scene &scene) {
   if (map.has("colliders[].layer")) c.layer = readName(map.at("colliders[].layer"));
   c.position = map.vector("colliders[].position");
   const Vec3 rotation = map.vector("colliders[].rotation");
-  if (rotation.norm() > 0) turn = Eigen::AngleAxisd(rotation.norm(), rotation.normalized()).toRotationMatrix() * turn;
-  c.rotation = turn;
+  c.rotation = rotationBy(rotation) * turn;
   if (map.has("colliders[].motion")) c.motion = readMotion(map.at("colliders[].motion"), collider_motion_keys);
   if (map.has("colliders[].friction")) c.friction = map.number("colliders[].friction");
   map.finish();

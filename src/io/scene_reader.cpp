@@ -1,5 +1,6 @@
 #include "tendril/io/scene_reader.hpp"
 
+#include "tendril/geometry/rotation.hpp"
 #include "tendril/io/body_reader.hpp"
 #include "tendril/io/collider_reader.hpp"
 #include "tendril/io/junction_reader.hpp"
@@ -85,9 +86,7 @@ void place(const YamlValue &value, std::vector<Polyline> &shapes) {
   const double scale = map.number("rods[].place.scale");
   const Vec3 rotation = map.vector("rods[].place.rotation"), translation = map.vector("rods[].place.translation");
   map.finish();
-  const double angle = rotation.norm();
-  const Eigen::Matrix3d turn = angle > 0 ? Eigen::Matrix3d(Eigen::AngleAxisd(angle, rotation / angle))
-                                         : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
+  const Mat3 turn = rotationBy(rotation);
   auto placed = [=](const Vec3 &x) { return Vec3(turn * (scale * x) + translation); };
   for (Polyline &shape : shapes) {
     for (Vec3 &x : shape.points) x = placed(x);

@@ -1,6 +1,7 @@
 #include "tendril/io/skin_reader.hpp"
 
 #include "tendril/embedding/embedding.hpp"
+#include "tendril/geometry/rotation.hpp"
 #include "tendril/io/mesh_reader.hpp"
 
 #include <filesystem>
@@ -52,8 +53,7 @@ void readMeshOf(const YamlValue &value, SkinRecipe *skin) {
   }
   const double scale = map.number("rods[].skin.mesh.scale");
   const Vec3 turn = map.vector("rods[].skin.mesh.rotation"), shift = map.vector("rods[].skin.mesh.translation");
-  const Mat3 rotation =
-      turn.norm() > 0 ? Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix() : Mat3(Mat3::Identity());
+  const Mat3 rotation = rotationBy(turn);
   for (Vec3 &x : mesh.vertices) x = rotation * (scale * x) + shift;
   skin->edges = map.integer("rods[].skin.mesh.edges");
   skin->name = file.text();

@@ -2,20 +2,12 @@
 #include "tendril/contact/friction.hpp"
 
 #include "support/differences.hpp"
-#include "support/rods.hpp"
+#include "support/touching.hpp"
 
 namespace tendril::test {
 namespace {
 
 constexpr double radius = 0.005, g = 9.81;
-
-Collider solid(std::shared_ptr<const Shape> shape, const Vec3 &position = Vec3::Zero()) {
-  Collider c;
-  c.name = "obstacle";
-  c.shape = std::move(shape);
-  c.position = position;
-  return c;
-}
 
 /// A round rod on the plane z = 0, which is inclined by an angle along a direction.
 Scene onIncline(double coefficient, double angle, const Vec3 &along, bool at_surface, int edges = 6) {

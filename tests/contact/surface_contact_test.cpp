@@ -2,7 +2,7 @@
 #include "tendril/contact/contact.hpp"
 
 #include "support/differences.hpp"
-#include "support/rods.hpp"
+#include "support/touching.hpp"
 #include "tendril/embedding/embedding.hpp"
 
 namespace tendril::test {
@@ -146,14 +146,6 @@ TEST(EdgePoint, DoesTheWorkOfItsForces) {
     for (Frame &f : moved.frame) f = {turn * f.tangent, turn * f.director, f.length};
     EXPECT_LT((placeOf(p, OnRod(moved).c) - turn * placeOf(p, on.c) - shift).norm(), 1e-14);
   }
-}
-
-Collider solid(std::shared_ptr<const Shape> shape, const Vec3 &position = Vec3::Zero()) {
-  Collider c;
-  c.name = "obstacle";
-  c.shape = std::move(shape);
-  c.position = position;
-  return c;
 }
 
 /// Gives a rod a tube that touches, with samples of so many points a triangle.

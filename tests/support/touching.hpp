@@ -1,5 +1,5 @@
 #pragma once
-/// Rods and bodies that touch each other.
+/// Rods, bodies and obstacles that touch each other.
 #include "support/rods.hpp"
 
 namespace tendril::test {
@@ -23,6 +23,15 @@ inline Rod wire(const std::string &name, const Vec3 &from, const Vec3 &to, int e
   rod.contact = amongRods(radius);
   setBishopDirectors(rod);
   return rod;
+}
+
+/// An obstacle that stands still.
+inline Collider solid(std::shared_ptr<const Shape> shape, const Vec3 &position = Vec3::Zero()) {
+  Collider c;
+  c.name = "obstacle";
+  c.shape = std::move(shape);
+  c.position = position;
+  return c;
 }
 
 inline Body shaped(const std::string &shape, const Vec3 &size, const Vec3 &at, const Mat3 &turn = Mat3::Identity()) {

@@ -13,6 +13,10 @@ struct CarriedPoint {
   Vec3 arm;  ///< from there along tangent and both directors, or from the centre of mass as drawn [m]
 };
 
+/// What moves at e + arm by the edge's vector and twist.
+using ByEdge = Eigen::Matrix<double, 3, edge_size>;
+ByEdge byEdge(const CarriedPoint &point, const Frame &frame);
+
 /// A point that one edge of a rod carries, or two behind each other: the sum of weight (x + at e + arm), by their
 /// vertices x and vectors e.
 struct EdgePoint {

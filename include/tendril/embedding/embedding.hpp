@@ -38,6 +38,8 @@ struct SkinMeasure {
   double area = 0, volume = 0, side = 0;
 };
 SkinMeasure measureOf(const Rod &rod, const Skin &skin);
+/// Area over the length of the rod: the mean of its perimeters [m].
+double perimeterOf(const Rod &rod, const Skin &skin);
 /// Throws std::invalid_argument that says what is wrong with a surface that is not closed, or inside out.
 void checkClosed(const Rod &rod, const Skin &skin);
 /// Which of some places are in a closed skin as drawn.
