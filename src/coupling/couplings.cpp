@@ -5,7 +5,8 @@ namespace {
 
 /// All couplings. A new one needs its line here and nothing else.
 constexpr std::unique_ptr<Term> (*couplings[])(const Scene &, const Elements &) = {
-    makePins, makeTies, makeRotations, makeRotationsToBodies, makeJoints, makeBodyContact, makeContact, makeRodContact, makeContactOfBodies};
+    makePins,    makeTies,        makeRotations, makeRotationsToBodies, makeJoints,
+    makeTendons, makeBodyContact, makeContact,   makeRodContact,        makeContactOfBodies};
 
 } // namespace
 

@@ -1,5 +1,6 @@
 #include "tendril/energy/cell.hpp"
 #include "tendril/energy/joint.hpp"
+#include "tendril/energy/tendon.hpp"
 
 #include "tendril/energy/constraint.hpp"
 
@@ -26,6 +27,11 @@ std::vector<double> strainsOf(const Scene &scene, const Elements &elements, cons
     const Rows rows = dampedRows(scene.joints[n], placeOf(scene.joints[n], pair, elements, c));
     for (int k = 0; k < joint_rows; ++k) strains[std::size_t(pair.first + k)] = rows[k];
   }
+  for (std::size_t n = 0; n < scene.tendons.size(); ++n)
+    if (scene.tendons[n].dissipates()) {
+      const TendonPath path(scene, elements, int(n));
+      strains[std::size_t(path.slot())] = path.displacement(c);
+    }
   return strains;
 }
 

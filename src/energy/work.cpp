@@ -1,6 +1,7 @@
 #include "tendril/energy/work.hpp"
 
 #include "tendril/energy/derived.hpp"
+#include "tendril/energy/tendon.hpp"
 #include "tendril/state/spin_stage.hpp"
 
 namespace tendril {
@@ -23,8 +24,14 @@ HolderActions staticActions(const Scene &scene, const Elements &elements, const 
                             const std::vector<Holder> &moving) {
   const RodActions actions = rodActions(scene, elements, state, state.time, state.time, false);
   HolderActions out;
+  const Configuration c = configurationOf(state, scene, elements, state.time);
   for (const Holder &h : moving)
-    if (h.joint) {
+    if (h.tendon) {
+      const TendonPath path(scene, elements, h.index);
+      const double tension = actions.tendon[std::size_t(h.index)].tension;
+      const Vec3 force = h.place == 0 ? Vec3(-tension, 0, 0) : Vec3(tension * path.byTold(c)[std::size_t(h.place - 1)]);
+      out.insert(out.end(), {force, Vec3::Zero()});
+    } else if (h.joint) {
       const JointReading &of = actions.joint[h.index];
       if (h.drives)
         out.insert(out.end(), {Vec3(of.drive, 0, 0), Vec3::Zero()});
@@ -74,6 +81,13 @@ void addWorkOfLoads(const Scene &scene, const Elements &elements, const Configur
     sum.add(mean *
             (body.force.dot(end.displacementAt(b.position, start) + turned) + body.torque.dot(turnOf(b, start, end))));
   }
+  for (int k = 0; k < int(scene.tendons.size()); ++k) {
+    const Actuator &actuator = scene.tendons[std::size_t(k)].actuator;
+    if (actuator.kind != Actuator::Kind::force && actuator.kind != Actuator::Kind::mckibben) continue;
+    const TendonPath path(scene, elements, k);
+    sum.add(workBetween(actuator, path.displacement(start), path.displacement(end),
+                        0.5 * (path.input(start) + path.input(end))));
+  }
   if (factor_end == factor_start) return;
   for (const Body &body : scene.bodies) {
     const JoinedBody &b = elements.body(int(&body - scene.bodies.data()));
@@ -96,6 +110,17 @@ std::vector<Holder> movingHolders(const Scene &scene) {
     for (const bool drives : {false, true})
       if (const Motion &motion = drives ? j.target_motion : j.motion; motion.moves())
         moving.push_back({j.rod, &motion, int(&j - scene.joints.data()), nullptr, nullptr, nullptr, &j, drives});
+  for (const Tendon &t : scene.tendons) {
+    const int index = int(&t - scene.tendons.data());
+    auto add = [&](const Motion &motion, int place) {
+      if (motion.moves())
+        moving.push_back({t.rod, &motion, index, nullptr, nullptr, nullptr, nullptr, false, &t, place});
+    };
+    if (t.actuator.kind == Actuator::Kind::displacement) add(t.actuator.input_motion, 0);
+    int place = 0;
+    for (const Waypoint &p : t.points)
+      if (p.isTold()) add(p.motion, ++place);
+  }
   return moving;
 }
 

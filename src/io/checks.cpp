@@ -28,6 +28,8 @@ void requireHeld(const Scene &scene) {
   for (const Attachment &a : scene.attachments) first[rootOf(a.rod)] = rootOf(scene.bodies[a.body].rod);
   for (const Joint &j : scene.joints)
     if (j.parent >= 0) first[rootOf(j.rod)] = rootOf(scene.bodies[j.parent].rod);
+  for (const Tendon &t : scene.tendons)
+    for (const int r : scene.rodsOf(t)) first[rootOf(t.rod)] = rootOf(r);
   std::vector<char> held(scene.rods.size(), false);
   for (const Support &s : scene.supports)
     if (s.holdsPosition()) held[rootOf(s.rod)] = true;
@@ -46,7 +48,7 @@ void requireHeld(const Scene &scene) {
   for (const Joint &j : scene.joints)
     if (j.parent >= 0) tied[j.parent] = true;
   for (int b = 0; b < int(tied.size()); ++b)
-    if (!tied[b] && !scene.touchesBody(b))
+    if (!tied[b] && !scene.isPressed(b))
       throw SceneError(
           "body '" + scene.bodies[b].name +
           "' is free to move: -mode static needs a weld or pin, exact or with a stiffness, that ties it to "

@@ -1,5 +1,6 @@
 #include "tendril/io/body_reader.hpp"
 #include "tendril/io/support_reader.hpp"
+#include "tendril/io/tendon_reader.hpp"
 
 #include <algorithm>
 
@@ -62,15 +63,7 @@ void readDrive(YamlMap &map, const std::string &coordinate, Joint &joint) {
   if (drive.has("joints[].drive.table")) {
     const YamlValue table = drive.at("joints[].drive.table");
     if (drive.has("joints[].drive.target")) table.fail("a drive takes a 'target' or a 'table', not both");
-    for (const YamlValue &row : table.items()) {
-      const std::vector<double> v = row.numbers(2);
-      std::vector<Motion::Key> &rows = joint.target_motion.table;
-      if (!rows.empty() && rows.back().time >= v[0])
-        row.fail("the times of 'table' must increase, found " + shortText(v[0]) + " after " +
-                 shortText(rows.back().time));
-      rows.push_back({v[0], {v[1], 0, 0}, Vec3::Zero()});
-    }
-    if (joint.target_motion.table.empty()) table.fail("'table' is empty");
+    joint.target_motion = readProfile(table);
   }
   drive.finish();
 }

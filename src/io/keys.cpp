@@ -161,6 +161,16 @@ std::string rulesOf(std::string_view block) {
   if (block == "supports[].motion" || block == "constraints[].motion" || block == "colliders[].motion" ||
       block == "bodies[].motion")
     return R"("oneOf": [{"required": ["table"]}, {"anyOf": [{"required": ["velocity"]}, {"required": ["angular_velocity"]}]}])";
+  if (block == "tendons[].path[]")
+    return R"("oneOf": [{"required": ["body"]}, {"required": ["rod"]}, {"required": ["joint"]}, {"required": ["cylinder"]}, {"required": ["sphere"]}],
+ "dependencies": {"vertex": ["rod"], "edge": ["rod"], "offset": ["edge"], "coefficient": ["joint"], "axis": ["cylinder"], "side": ["cylinder"]},
+ "not": {"required": ["vertex", "edge"]})";
+  if (block == "tendons[]")
+    return R"("not": {"anyOf": [{"required": ["displacement", "force"]}, {"required": ["displacement", "mckibben"]}, {"required": ["force", "mckibben"]}]})";
+  if (block == "tendons[].force")
+    return R"("oneOf": [{"required": ["tension"]}, {"required": ["table"]}])";
+  if (block == "tendons[].mckibben")
+    return R"("oneOf": [{"required": ["pressure"]}, {"required": ["table"]}])";
   if (block == "contact")
     return R"("if": {"required": ["radius"], "properties": {"radius": {"const": 0}}},
  "then": {"required": ["law"], "properties": {"law": {"const": "penalty"}}})";

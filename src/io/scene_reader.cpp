@@ -7,6 +7,7 @@
 #include "tendril/io/polyline_reader.hpp"
 #include "tendril/io/skin_reader.hpp"
 #include "tendril/io/support_reader.hpp"
+#include "tendril/io/tendon_reader.hpp"
 #include "tendril/io/text.hpp"
 #include "tendril/io/yaml.hpp"
 #include "tendril/model/builders.hpp"
@@ -340,6 +341,8 @@ SceneFile readScene(const std::string &path, const Overrides &overrides) {
     map.at("rotation").fail("a frame that turns has no forces on 'bodies' yet; take 'rotation' or the bodies away");
   if (map.has("joints"))
     for (const YamlValue &v : map.at("joints").items()) readJoint(v, out);
+  if (map.has("tendons"))
+    for (const YamlValue &v : map.at("tendons").items()) readTendon(v, out);
   if (map.has("supports"))
     for (const YamlValue &v : map.at("supports").items()) readSupport(v, out);
   if (map.has("constraints"))

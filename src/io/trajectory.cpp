@@ -1,6 +1,6 @@
 #include "tendril/io/trajectory.hpp"
 
-#include "tendril/energy/derived.hpp"
+#include "tendril/io/trajectory_fields.hpp"
 #include "tendril/io/xdmf.hpp"
 
 #include <algorithm>
@@ -12,99 +12,6 @@
 namespace tendril {
 namespace {
 
-enum class On { vertices, edges, cells, supports, constraints, colliders, bodies, attachments, joints };
-constexpr const char *places[] = {"vertices",  "edges",  "cells",       "supports", "constraints",
-                                  "colliders", "bodies", "attachments", "joints"};
-
-/// Bodies by their origins and axes: places, quaternions, velocities, spins, and angular momenta about the centres of
-/// mass.
-struct BodyMotion {
-  std::vector<Vec3> position, velocity, spin, momentum;
-  std::vector<Eigen::Vector4d> rotation;
-};
-
-/// A frame about to be written: a state and what is derived from it, as far as some field needs it.
-struct Snapshot {
-  const State &state;
-  RodStrains strains;
-  RodActions actions;
-  std::vector<double> constraint_deviation = {}, constraint_force = {}, joint_coordinate = {};
-  std::vector<Vec3> joint_distance = {}, joint_force = {}, joint_moment = {};
-  std::vector<ContactReading> contacts = {};
-  std::vector<Vec3> contact_force = {}, collider_force = {}, collider_moment = {}, collider_position = {};
-  std::vector<Eigen::Vector4d> collider_rotation = {};
-  BodyMotion body = {};
-};
-enum class From { state, second_word, strains, actions, contact, motion, bodies };
-
-struct Field {
-  const char *name, *unit;
-  On place;
-  hsize_t components;
-  From source;
-  const double *(*data)(const Snapshot &);
-};
-
-const Field fields[] = {
-    {"position", "m", On::vertices, 3, From::state, [](const Snapshot &s) { return s.state.position[0].data(); }},
-    {"director", "1", On::edges, 3, From::state, [](const Snapshot &s) { return s.state.director[0].data(); }},
-    {"velocity", "m/s", On::vertices, 3, From::state, [](const Snapshot &s) { return s.state.velocity[0].data(); }},
-    {"twist_rate", "rad/s", On::edges, 1, From::state, [](const Snapshot &s) { return s.state.twist_rate.data(); }},
-    {"axial_force", "N", On::edges, 1, From::state, [](const Snapshot &s) { return s.state.axial_force.data(); }},
-    // Measure `angle`: 2 pi x whole turns of each cell's twist [rad].
-    {"turns", "rad", On::cells, 1, From::state, [](const Snapshot &s) { return s.state.winding.data(); }},
-    {"position_low", "m", On::vertices, 3, From::second_word,
-     [](const Snapshot &s) { return s.state.position_low[0].data(); }},
-    {"curvature", "1/m", On::vertices, 2, From::strains,
-     [](const Snapshot &s) { return s.strains.curvature[0].data(); }},
-    {"twist", "rad/m", On::vertices, 1, From::strains, [](const Snapshot &s) { return s.strains.twist.data(); }},
-    {"strain_energy_density", "J/m", On::vertices, 1, From::strains,
-     [](const Snapshot &s) { return s.strains.strain_energy_density.data(); }},
-    {"force", "N", On::edges, 3, From::actions, [](const Snapshot &s) { return s.actions.force[0].data(); }},
-    {"moment", "N m", On::vertices, 3, From::actions, [](const Snapshot &s) { return s.actions.moment[0].data(); }},
-    {"reaction", "N", On::supports, 3, From::actions, [](const Snapshot &s) { return s.actions.reaction[0].data(); }},
-    {"reaction_moment", "N m", On::supports, 3, From::actions,
-     [](const Snapshot &s) { return s.actions.reaction_moment[0].data(); }},
-    // Of pins the first three numbers, of rotations the last three.
-    {"constraint_deviation", "m, rad", On::constraints, 6, From::actions,
-     [](const Snapshot &s) { return s.constraint_deviation.data(); }},
-    {"constraint_force", "N, N m", On::constraints, 6, From::actions,
-     [](const Snapshot &s) { return s.constraint_force.data(); }},
-    {"contact_force", "N", On::vertices, 3, From::contact, [](const Snapshot &s) { return s.contact_force[0].data(); }},
-    // On the rods; moments about the positions of the obstacles.
-    {"collider_force", "N", On::colliders, 3, From::contact,
-     [](const Snapshot &s) { return s.collider_force[0].data(); }},
-    {"collider_moment", "N m", On::colliders, 3, From::contact,
-     [](const Snapshot &s) { return s.collider_moment[0].data(); }},
-    // On bodies, where rods are tied to them exactly; the moment about the vertex.
-    {"attachment_force", "N", On::attachments, 3, From::actions,
-     [](const Snapshot &s) { return s.actions.attachment[0].data(); }},
-    {"attachment_moment", "N m", On::attachments, 3, From::actions,
-     [](const Snapshot &s) { return s.actions.attachment_moment[0].data(); }},
-    // By how much the child is from the parent, and what acts on it: at the joint's point.
-    {"joint_coordinate", "m, rad", On::joints, 1, From::actions,
-     [](const Snapshot &s) { return s.joint_coordinate.data(); }},
-    {"joint_distance", "m", On::joints, 3, From::actions, [](const Snapshot &s) { return s.joint_distance[0].data(); }},
-    {"joint_force", "N", On::joints, 3, From::actions, [](const Snapshot &s) { return s.joint_force[0].data(); }},
-    {"joint_moment", "N m", On::joints, 3, From::actions, [](const Snapshot &s) { return s.joint_moment[0].data(); }},
-    // Where obstacles stand, and quaternions w, x, y, z from their axes to the world's; where any moves.
-    {"collider_position", "m", On::colliders, 3, From::motion,
-     [](const Snapshot &s) { return s.collider_position[0].data(); }},
-    {"collider_rotation", "1", On::colliders, 4, From::motion,
-     [](const Snapshot &s) { return s.collider_rotation[0].data(); }},
-    // Of the origins of bodies, but the last: it is about the centres of mass.
-    {"body_position", "m", On::bodies, 3, From::bodies, [](const Snapshot &s) { return s.body.position[0].data(); }},
-    {"body_rotation", "1", On::bodies, 4, From::bodies, [](const Snapshot &s) { return s.body.rotation[0].data(); }},
-    {"body_velocity", "m/s", On::bodies, 3, From::bodies, [](const Snapshot &s) { return s.body.velocity[0].data(); }},
-    {"body_angular_velocity", "rad/s", On::bodies, 3, From::bodies,
-     [](const Snapshot &s) { return s.body.spin[0].data(); }},
-    {"body_momentum", "kg m^2/s", On::bodies, 3, From::bodies,
-     [](const Snapshot &s) { return s.body.momentum[0].data(); }},
-};
-
-/// Fields that are written where nothing else is said.
-bool isUsual(From source) { return source == From::state || source == From::motion || source == From::bodies; }
-
 std::vector<std::string> namesOf(bool derived) {
   std::vector<std::string> names;
   for (const Field &f : fields)
@@ -114,50 +21,6 @@ std::vector<std::string> namesOf(bool derived) {
 
 constexpr auto patience = std::chrono::milliseconds(500); ///< how long rows and frames may wait
 constexpr std::size_t most_waiting = 4 << 20;             ///< [bytes]
-
-/// w, x, y, z
-Eigen::Vector4d quaternionOf(const Mat3 &rotation) {
-  const Eigen::Quaterniond q(rotation);
-  return {q.w(), q.x(), q.y(), q.z()};
-}
-
-BodyMotion motionOfBodies(const Scene &scene, const Elements &elements, const State &state) {
-  BodyMotion motion;
-  const int count = int(scene.bodies.size());
-  for (int b = 0; b < count; ++b) {
-    const Body &body = scene.bodies[b];
-    const BodyRate &rate = state.body_rate[b];
-    const Mat3 turn = rotationOf(state, elements.groups - count + b);
-    const Vec3 arm = turn * (body.position - elements.bodyMass(b).centre);
-    motion.position.push_back(state.body_position[b] + (arm + state.body_position_low[b]));
-    motion.rotation.push_back(quaternionOf(turn * body.rotation));
-    motion.velocity.push_back(rate.translation + rate.spin.cross(arm));
-    motion.spin.push_back(rate.spin);
-    motion.momentum.push_back(rate.momentum);
-  }
-  for (const Body &body : scene.held_bodies) {
-    const Mat3 turn = body.motion.rotationAt(state.time);
-    motion.position.push_back(body.position + body.motion.displacementAt(state.time));
-    motion.rotation.push_back(quaternionOf(turn * body.rotation));
-    motion.velocity.push_back(body.motion.velocityAt(state.time));
-    motion.spin.push_back(body.motion.angularVelocityAt(state.time));
-    const Vec3 spin = turn.transpose() * motion.spin.back();
-    motion.momentum.push_back(turn * (body.own.inertia * spin));
-  }
-  return motion;
-}
-
-std::array<int, std::size(places)> sizes(const Scene &scene, const Elements &e) {
-  return {e.vertices(),
-          e.edges(),
-          int(e.cell_slot.size()),
-          int(e.support_slot.size()),
-          int(e.constraint_slot.size()),
-          int(scene.colliders.size()),
-          int(scene.bodies.size() + scene.held_bodies.size()),
-          int(scene.attachments.size()),
-          int(scene.joints.size())};
-}
 
 } // namespace
 
@@ -281,6 +144,17 @@ void TrajectoryWriter::writeFrame(const State &state) {
     for (const Vec3 *x : {&c.force, &c.moment})
       snapshot.constraint_force.insert(snapshot.constraint_force.end(), x->data(), x->data() + 3);
   }
+  if (wanted(From::tendons)) {
+    const Configuration c = configurationOf(state, scene_, elements_, state.time);
+    for (int k = 0; k < int(scene_.tendons.size()); ++k) {
+      const TendonReading t = readTendon(scene_, elements_, k, state, c, dynamic_);
+      snapshot.tendon_displacement.push_back(t.displacement);
+      snapshot.tendon_length.push_back(t.length);
+      snapshot.tendon_rate.push_back(t.rate);
+      snapshot.tendon_tension.push_back(t.tension);
+      snapshot.tendon_position.insert(snapshot.tendon_position.end(), t.points.begin(), t.points.end());
+    }
+  }
   for (const JointReading &j : snapshot.actions.joint) {
     snapshot.joint_coordinate.push_back(j.coordinate);
     snapshot.joint_distance.push_back(j.distance);
@@ -343,7 +217,7 @@ void TrajectoryWriter::flushWhenDue() {
 }
 
 /// `rods`: a polyline each, with the fields of vertices; `edges`: a segment each, with those of edges as cell data as
-/// well; `bodies`: a point each, where they are written.
+/// well; `bodies`: a point each, `tendons`: their segments, where they are written.
 void TrajectoryWriter::writeXdmf() const {
   const auto rows = sizes(scene_, elements_);
   auto described = [&](const Field &f, bool of_cells = false) {
@@ -359,6 +233,8 @@ void TrajectoryWriter::writeXdmf() const {
                        count(scene_.bodies.size() + scene_.held_bodies.size()),
                    "topology/bodies", std::to_string(scene_.bodies.size() + scene_.held_bodies.size()),
                    "bodies in frame"};
+  XdmfBlock tendons{"tendons", "\"Polyline\" NodesPerElement=\"2\" NumberOfElements=" + count(tendon_segments_),
+                    "tendons/segments", std::to_string(tendon_segments_) + " 2", "tendons in frame"};
   rods.position = edges.position = described(fields[0]);
   rods.has_radius = edges.has_radius = true;
   for (std::size_t k = 1; k < state_.size(); ++k) {
@@ -367,6 +243,7 @@ void TrajectoryWriter::writeXdmf() const {
     if (f.place == On::vertices)
       for (XdmfBlock *block : {&rods, &edges}) block->fields.push_back(described(f));
     if (f.place == On::edges) edges.fields.push_back(described(f, true));
+    if (f.place == On::tendon_points && tendon_segments_ > 0) tendons.position = described(f);
     if (f.place != On::bodies) continue;
     if (std::string(f.name) == "body_position")
       bodies.position = described(f);
@@ -374,7 +251,8 @@ void TrajectoryWriter::writeXdmf() const {
       bodies.fields.push_back(described(f));
   }
   std::vector<XdmfBlock> blocks{rods, edges};
-  if (!bodies.position.name.empty()) blocks.push_back(bodies);
+  for (const XdmfBlock &block : {bodies, tendons})
+    if (!block.position.name.empty()) blocks.push_back(block);
   tendril::writeXdmf(folder_ + "/trajectory.xdmf", blocks, times_);
 }
 

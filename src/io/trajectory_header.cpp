@@ -70,6 +70,7 @@ void TrajectoryWriter::writeHeader(const Scene &scene, const Elements &elements,
   writeColliders();
   writeBodies();
   writeJoints();
+  writeTendons();
   writeMaterials();
 }
 
@@ -255,6 +256,33 @@ void TrajectoryWriter::writeJoints() {
   file_.write("joints/parent", {n}, parents.data()); // -1: the world, or a body that no step moves
   file_.write("joints/point", {n, 3}, points.data(), "m");
   file_.write("joints/axis", {n, 3}, axes.data(), "1");
+}
+
+void TrajectoryWriter::writeTendons() {
+  if (scene_.tendons.empty()) return;
+  std::vector<std::string> names, actuators;
+  std::vector<int> first{0}, segments;
+  for (const Tendon &t : scene_.tendons) {
+    names.push_back(t.name);
+    actuators.emplace_back(nameOf(t.actuator.kind));
+    int at = first.back();
+    for (int k = 0; k < int(t.points.size()); ++k) {
+      int next = at + 1;
+      for (const Tendon::Segment &s : t.segments) {
+        if (s.from != k) continue;
+        next += s.wrap < 0 ? 0 : Tendon::drawn_points;
+        for (int p = at; p < next; ++p) segments.insert(segments.end(), {p, p + 1});
+      }
+      at = next;
+    }
+    first.push_back(at);
+  }
+  file_.createGroup("tendons");
+  file_.write("tendons/name", names);
+  file_.write("tendons/actuator", actuators);
+  file_.write("tendons/first_point", {first.size()}, first.data()); // of the rows of state/tendon_position, and the end
+  tendon_segments_ = int(segments.size() / 2);
+  if (tendon_segments_ > 0) file_.write("tendons/segments", {segments.size() / 2, 2}, segments.data());
 }
 
 void TrajectoryWriter::writeMaterials() {

@@ -122,9 +122,14 @@ void DofMap::layOut(const Scene &scene) {
   for (const Body &b : scene.bodies) along[b.rod] += 2;
   for (const Joint &j : scene.joints) along[j.rod] += BodyPair::slots;
   for (int b = 0; b < int(scene.bodies.size()); ++b)
-    if (scene.touchesBody(b)) along[scene.bodies[b].rod] += BodyPair::slots;
+    if (scene.isPressed(b)) along[scene.bodies[b].rod] += BodyPair::slots;
   for (const Attachment &a : scene.attachments) along[a.rod] += 5; // and a frame of the vertex
-  slots_ = lanes;                                                  // room for the frame before the first rod
+  tendon_slot_.clear();
+  for (const Tendon &t : scene.tendons) {
+    tendon_slot_.push_back(along[t.rod]);
+    along[t.rod] += t.slots();
+  }
+  slots_ = lanes; // room for the frame before the first rod
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
     const Rod &rod = scene.rods[r];
     // A pack between the slots behind the last vertex and what follows, so that no pack holds parts of both; and a slot
@@ -136,6 +141,7 @@ void DofMap::layOut(const Scene &scene) {
     edges_ += rod.edges();
     slots_ += slots;
   }
+  for (std::size_t k = 0; k < tendon_slot_.size(); ++k) tendon_slot_[k] += rods_[scene.tendons[k].rod].looseSlot();
   held_.assign(vertices_, false);
   for (const Support &s : scene.supports)
     if (s.holdsPosition()) held_[rods_[s.rod].first_vertex + s.vertex] = true;

@@ -174,12 +174,13 @@ private:
 
 Elements::Elements(const Scene &scene, const DofMap &dofs)
     : rods(dofs.rods()), slots(dofs.slots()), loose(rods.size()), end_couples(rods.size()),
-      support_slot(scene.supports.size(), -1), rod_cells{0}, groups(dofs.groups()),
+      support_slot(scene.supports.size(), -1), tendon_slot(dofs.tendonSlots()), rod_cells{0}, groups(dofs.groups()),
       supports_(scene.supports, rods.size()), forces_(scene.forces, rods.size()), moments_(scene.moments, rods.size()),
-      joined_edges_(dofs.joinedEdges()), joined_vertices_(dofs.joinedVertices()), ties_(dofs.ties()),
-      bodies_(dofs.bodies()), pairs_(dofs.pairs()), place_of_joint_(scene.joints.size()),
+      tendons_(scene.tendons, rods.size()), joined_edges_(dofs.joinedEdges()), joined_vertices_(dofs.joinedVertices()),
+      ties_(dofs.ties()), bodies_(dofs.bodies()), pairs_(dofs.pairs()), place_of_joint_(scene.joints.size()),
       place_of_contact_(scene.bodies.size(), -1) {
   std::vector<int> free_slots; ///< per rod, behind those of its supports
+  for (const Tendon &t : scene.tendons) tendon_slots_.push_back(t.slots());
   constants_ = Planes(7, slots);
   joined_frame_.resize(joined_edges_.items.size());
   cells_ = Planes(cell_planes, slots);

@@ -68,7 +68,7 @@ void DofMap::joinBodies(const Scene &scene, std::vector<int> &free_slots) {
     pairs_.items.push_back(pair);
   }
   for (int b = 0; b < int(scene.bodies.size()); ++b)
-    if (scene.touchesBody(b)) pairs_.items.push_back(makePair(bodies_.items[b], -1));
+    if (scene.isPressed(b)) pairs_.items.push_back(makePair(bodies_.items[b], -1));
   for (int k = 0; k < int(scene.attachments.size()); ++k) {
     const Attachment &a = scene.attachments[k];
     const RodRange &range = rods_[a.rod];

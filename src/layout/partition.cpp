@@ -42,6 +42,8 @@ Islands islandsOf(const Scene &scene) {
   for (const Attachment &a : scene.attachments) join(scene.bodies[a.body].rod, a.rod);
   for (const Joint &j : scene.joints)
     if (j.parent >= 0) join(j.rod, scene.bodies[j.parent].rod);
+  for (const Tendon &t : scene.tendons)
+    for (const int r : scene.rodsOf(t)) join(t.rod, r);
   for (std::size_t r = 0; r < n; ++r) islands.rods[rootOf(int(r))].push_back(int(r));
   for (const int r : any) islands.joined[rootOf(r)] = true;
   return islands;

@@ -79,7 +79,7 @@ std::vector<int> firstAlike(const Scene &scene, const std::vector<Drawing> &draw
   std::vector<int> first, kinds;
   for (int s = 0; s < int(rods); ++s) {
     const auto found = scene.rotation.angular_velocity.isZero(0) && scene.colliders.empty() && !scene.isJoined() &&
-                               !scene.touchesMoving()
+                               !scene.touchesMoving() && scene.tendons.empty()
                            ? std::find_if(kinds.begin(), kinds.end(), [&](int r) { return alike(r, s); })
                            : kinds.end();
     first.push_back(found == kinds.end() ? s : *found);

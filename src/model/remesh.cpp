@@ -323,6 +323,16 @@ Scene remesh(const Scene &written, const std::vector<Drawing> &drawings, const s
   scene.bodies = written.bodies;
   scene.held_bodies = written.held_bodies;
   scene.joints = written.joints;
+  scene.tendons = written.tendons;
+  for (Tendon &tendon : scene.tendons)
+    for (Waypoint &p : tendon.points) {
+      if (p.isTold() || p.body >= 0 || !isRemeshed(written.rods[p.rod], drawings[p.rod], edges[p.rod])) continue;
+      if (p.isVertex())
+        p.setVertex(movedVertex(written.rods[p.rod], drawings[p.rod], p.vertex(), edges[p.rod]),
+                    scene.rods[p.rod].edges());
+      else
+        p.edge = movedEdge(written.rods[p.rod], drawings[p.rod], p.edge, edges[p.rod]);
+    }
   for (const Attachment &attachment : written.attachments) {
     Attachment &a = scene.attachments.emplace_back(attachment);
     const Drawing &drawing = drawings[a.rod];

@@ -51,7 +51,8 @@ bool Scene::strainsDissipate() const {
   return std::any_of(rods.begin(), rods.end(),
                      [](const Rod &rod) { return rod.material.stiffness_damping_coefficient != 0; }) ||
          std::any_of(constraints.begin(), constraints.end(), [](const Constraint &c) { return c.damping != 0; }) ||
-         std::any_of(joints.begin(), joints.end(), [](const Joint &j) { return j.dissipates(); });
+         std::any_of(joints.begin(), joints.end(), [](const Joint &j) { return j.dissipates(); }) ||
+         std::any_of(tendons.begin(), tendons.end(), [](const Tendon &t) { return t.dissipates(); });
 }
 
 template <class Item>
@@ -90,11 +91,24 @@ Scene withRods(const Scene &scene, const std::vector<int> &rods) {
   for (Attachment &a : out.attachments) a.body = body[a.body];
   for (Constraint &c : out.constraints)
     if (c.isToBody()) c.to_body = body[c.to_body];
-  for (const Joint &j : scene.joints) {
+  std::vector<int> joint(scene.joints.size(), -1);
+  for (std::size_t k = 0; k < scene.joints.size(); ++k) {
+    const Joint &j = scene.joints[k];
     if (body[j.child] < 0) continue;
+    joint[k] = int(out.joints.size());
     Joint &kept = out.joints.emplace_back(j);
     kept.child = body[j.child];
     if (j.parent >= 0) kept.parent = body[j.parent];
+  }
+  keep(scene.tendons, place, out.tendons);
+  for (Tendon &t : out.tendons) {
+    for (Waypoint &p : t.points) {
+      if (p.body >= 0) p.body = body[p.body];
+      if (p.rod >= 0) p.rod = place[p.rod];
+    }
+    for (Wrap &w : t.wraps)
+      if (w.body >= 0) w.body = body[w.body];
+    for (Tendon::Pull &p : t.joints) p.joint = joint[p.joint];
   }
   out.hostBodies();
   keep(scene.forces, place, out.forces);
@@ -232,17 +246,67 @@ void Scene::hostBodies() {
   for (const Attachment &a : attachments) first[a.body] = std::min(first[a.body], a.rod);
   for (const Constraint &c : constraints)
     if (c.isToBody()) first[c.to_body] = std::min(first[c.to_body], c.rod);
+  for (const Tendon &t : tendons)
+    for (const Waypoint &p : t.points)
+      for (const int b : p.rod >= 0 ? bodiesOf(t) : std::vector<int>()) first[b] = std::min(first[b], p.rod);
   for (bool spreads = true; spreads;) {
     spreads = false;
+    auto spread = [&](int a, int b) {
+      if (first[a] == first[b]) return;
+      first[a] = first[b] = std::min(first[a], first[b]);
+      spreads = true;
+    };
     for (const Joint &j : joints)
-      if (j.parent >= 0 && first[j.child] != first[j.parent]) {
-        first[j.child] = first[j.parent] = std::min(first[j.child], first[j.parent]);
-        spreads = true;
-      }
+      if (j.parent >= 0) spread(j.child, j.parent);
+    for (const Tendon &t : tendons) {
+      const std::vector<int> pulled = bodiesOf(t);
+      for (const int b : pulled) spread(b, pulled.front());
+    }
   }
   for (std::size_t b = 0; b < bodies.size(); ++b)
     if (first[b] < int(rods.size())) bodies[b].rod = first[b];
   for (Joint &j : joints) j.rod = bodies[j.child].rod;
+  for (Tendon &t : tendons)
+    if (const std::vector<int> of = rodsOf(t); !of.empty()) t.rod = of.front();
+}
+
+std::vector<int> Scene::bodiesOf(const Tendon &tendon) const {
+  std::vector<int> all;
+  for (const Waypoint &p : tendon.points) all.push_back(p.body);
+  for (const Wrap &w : tendon.wraps) all.push_back(w.body);
+  for (const Tendon::Pull &p : tendon.joints) {
+    all.push_back(joints[p.joint].child);
+    all.push_back(joints[p.joint].parent);
+  }
+  std::sort(all.begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
+  if (!all.empty() && all.front() < 0) all.erase(all.begin());
+  return all;
+}
+
+std::vector<int> Scene::rodsOf(const Tendon &tendon) const {
+  std::vector<int> all;
+  for (const Waypoint &p : tendon.points)
+    if (p.rod >= 0) all.push_back(p.rod);
+  for (const int b : bodiesOf(tendon)) all.push_back(bodies[b].rod);
+  std::sort(all.begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
+  return all;
+}
+
+bool Scene::tendonsTwist() const {
+  return std::any_of(tendons.begin(), tendons.end(), [](const Tendon &t) {
+    return std::any_of(t.points.begin(), t.points.end(),
+                       [](const Waypoint &p) { return p.rod >= 0 && !p.point.isZero(0); });
+  });
+}
+
+bool Scene::isPressed(int body) const {
+  if (touchesBody(body)) return true;
+  return std::any_of(tendons.begin(), tendons.end(), [&](const Tendon &t) {
+    const std::vector<int> pulled = bodiesOf(t);
+    return std::binary_search(pulled.begin(), pulled.end(), body);
+  });
 }
 
 bool Scene::hasCouples() const {

@@ -18,7 +18,7 @@ IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, con
           std::any_of(terms_.begin(), terms_.end(), [](const auto &term) { return term->couplesPositions(); })),
       joins_positions_(
           std::any_of(terms_.begin(), terms_.end(), [](const auto &term) { return term->joinsPositions(); })),
-      touches_(scene.touchesMoving()), obstacles_move_(scene.collidersMove()),
+      touches_(scene.touchesMoving() || !scene.tendons.empty()), obstacles_move_(scene.collidersMove()),
       obstacles_held_(scene.rods.size(), false) {}
 
 void IncrementalPotential::beginStep(const State &start, const Step &step) {
@@ -287,6 +287,7 @@ std::array<Vec3, 2> IncrementalPotential::actionOf(const Holder &holder) {
   const int slot = holder.support      ? elements_.support_slot[holder.index]
                    : holder.constraint ? elements_.constraint_slot[holder.index]
                    : holder.joint      ? elements_.pairOf(holder.index).parent(holder.drives)
+                   : holder.tendon     ? elements_.tendon_slot[holder.index] + holder.place
                                        : -1;
   for (const auto &term : terms_) {
     if (slot < 0 && !holder.collider) break;

@@ -164,7 +164,7 @@ PetscErrorCode NewtonSolver::makeMatrix() {
     has = std::move(near);
   }
   if (!before && has.empty() && jacobian_.object()) PetscFunctionReturn(0);
-  pattern_.turns = potential_->scene().slidesAmongMoving();
+  pattern_.turns = potential_->scene().slidesAmongMoving() || potential_->scene().tendonsTwist();
   PetscCall(SNESGetKSP(snes_, &ksp));
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(KSPReset(ksp));

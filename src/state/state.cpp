@@ -33,6 +33,10 @@ void Configuration::copyEnds(const Elements &elements, int r, const Configuratio
     const int slot = elements.constraint_slot[k];
     copySlots(from, slot, slot + 1);
   }
+  for (const int k : elements.tendonsOf(r)) {
+    const auto [begin, end] = elements.tendonSlots(k);
+    copySlots(from, begin, end);
+  }
   if (from.obstacle_time_.empty()) return;
   obstacle_time_.resize(from.obstacle_time_.size());
   obstacle_time_[r] = from.obstacle_time_[r];
@@ -139,6 +143,14 @@ void setTargets(const Scene &scene, const Elements &elements, double motion_time
       setTarget(scene.constraints[k], elements.constraint_slot[k], motion_time, c);
   for (std::size_t k = 0; k < scene.joints.size(); ++k)
     setTarget(scene.joints[k], elements.pairOf(int(k)), motion_time, c);
+  for (std::size_t k = 0; k < scene.tendons.size(); ++k)
+    setTarget(scene.tendons[k], elements.tendon_slot[k], motion_time, c);
+}
+
+void setTarget(const Tendon &tendon, int slot, double motion_time, Configuration &c) {
+  c.setPosition(slot, {tendon.actuator.inputAt(motion_time), 0, 0}, Vec3::Zero());
+  for (const Waypoint &p : tendon.points)
+    if (p.isTold()) c.setPosition(++slot, p.point + p.motion.displacementAt(motion_time), Vec3::Zero());
 }
 
 void setTarget(const Joint &joint, const BodyPair &pair, double motion_time, Configuration &c) {

@@ -19,6 +19,12 @@ SupportMotion::SupportMotion(const Scene &scene, const DofMap &dofs, const Eleme
     }
   for (std::size_t k = 0; k < scene.joints.size(); ++k)
     if (scene.joints[k].motion.moves() || scene.joints[k].target_motion.moves()) moving_joints_.push_back(int(k));
+  for (std::size_t k = 0; k < scene.tendons.size(); ++k) {
+    const Tendon &t = scene.tendons[k];
+    if (t.actuator.input_motion.moves() ||
+        std::any_of(t.points.begin(), t.points.end(), [](const Waypoint &p) { return p.motion.moves(); }))
+      moving_tendons_.push_back(int(k));
+  }
 }
 
 void SupportMotion::turn(const Configuration &from, double from_time, double to_time) {
@@ -70,6 +76,8 @@ void SupportMotion::follow(int r, Configuration &iterate) {
     for (const int k : moving_targets_[r]) followTarget(k, iterate);
   for (const int k : moving_joints_)
     if (scene_.joints[k].rod == r) setTarget(scene_.joints[k], elements_.pairOf(k), to_time_, iterate);
+  for (const int k : moving_tendons_)
+    if (scene_.tendons[k].rod == r) setTarget(scene_.tendons[k], elements_.tendon_slot[k], to_time_, iterate);
   if (turned_[r].empty()) return;
   for (const Turned &turned : turned_[r]) iterate.setFrame(turned.slot, turned.end);
   auto turning = [&](int frame) {

@@ -3,6 +3,7 @@
 /// Derivatives of what two edges, an edge and a body, or two bodies do to each other.
 
 #include "tendril/contact/friction.hpp"
+#include "tendril/energy/carrier.hpp"
 
 #include <optional>
 
@@ -69,9 +70,8 @@ struct OnSkinOfPair {
 void addOnSkin(const Elements &elements, const TouchingPair &pair, int side, const OnSkinOfPair &on,
                const Configuration &c, HessianKind kind, Derivatives &out);
 
-/// Adds derivatives of a pair to both of the gradients and to the blocks: what each side has with itself goes to its
-/// own rod, of an edge by its first vertex, its vector and its twist, of a body to BodyPair; the rest to the block of
-/// the pair. \param number of the pair, or -1 where it has no block
+/// Adds derivatives of a pair to both of the gradients and to the blocks: what each side has with itself by addOwn, the
+/// rest to the block of the pair. \param number of the pair, or -1 where it has no block
 void addPair(const Elements &elements, const TouchingPair &pair, int number, const OfPair &d, HessianKind kind,
              Derivatives &out);
 

@@ -2,7 +2,7 @@
 /// \file skin_samples.hpp
 /// Where the skin of a rod touches.
 
-#include "tendril/contact/edge_point.hpp"
+#include "tendril/energy/edge_point.hpp"
 
 #include <span>
 

@@ -17,6 +17,8 @@ std::unique_ptr<Term> makeRotations(const Scene &, const Elements &);
 std::unique_ptr<Term> makeRotationsToBodies(const Scene &, const Elements &);
 /// Those between bodies; null where the scene has none.
 std::unique_ptr<Term> makeJoints(const Scene &, const Elements &);
+/// Tendons with what pulls on them; null where there are none.
+std::unique_ptr<Term> makeTendons(const Scene &, const Elements &);
 /// Those of bodies with obstacles; null where there are none.
 std::unique_ptr<Term> makeBodyContact(const Scene &, const Elements &);
 /// That of rods with obstacles; null where there are none.

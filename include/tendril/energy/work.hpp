@@ -24,8 +24,9 @@ struct Work {
 /// spin on the way [J]. Exact where the edge turns about one axis; else off by the third power of the turning.
 double coupleWork(const Vec3 &moment, double torque, const Vec3 &from, const Vec3 &to, double spin);
 
-/// Work of forces and couples between two configurations of one step, the load factor going from one value to another
-/// at a steady rate. A weight that grows adds to the potential that energies have of it: that counts here [J].
+/// Work of forces, couples and tensions that are given between two configurations of one step, the load factor going
+/// from one value to another at a steady rate. A weight that grows adds to the potential that energies have of it: that
+/// counts here [J].
 void addWorkOfLoads(const Scene &scene, const Elements &elements, const Configuration &start, const Configuration &end,
                     double factor_start, double factor_end, ExactSum &sum);
 
@@ -49,8 +50,10 @@ struct Holder {
   const Collider *collider = nullptr;     ///< or null
   const Joint *joint = nullptr;           ///< or null: by its parent, or by its drive
   bool drives = false;
+  const Tendon *tendon = nullptr; ///< or null: by the target of its actuator, or by a point ...
+  int place = 0;                  ///< ... which is this one of its slots
 };
-/// Supports, constraints and joints in one numbering, in this order.
+/// Supports, constraints, joints and tendons in one numbering, in this order.
 std::vector<Holder> movingHolders(const Scene &scene);
 /// Obstacles with each rod that may touch them.
 std::vector<Holder> movingObstacles(const Scene &scene);

@@ -7,6 +7,7 @@
 #include "tendril/io/body_keys.hpp"
 #include "tendril/io/option_keys.hpp"
 #include "tendril/io/scene_keys.hpp"
+#include "tendril/io/tendon_keys.hpp"
 
 #include <array>
 #include <string>
@@ -15,10 +16,11 @@ namespace tendril {
 
 /// Keys of scenes, then options.
 inline constexpr auto keys = [] {
-  std::array<Key, std::size(scene_keys) + std::size(body_keys) + std::size(option_keys)> all{};
+  std::array<Key, std::size(scene_keys) + std::size(body_keys) + std::size(tendon_keys) + std::size(option_keys)> all{};
   std::size_t row = 0;
   for (const Key &key : scene_keys) all[row++] = key;
   for (const Key &key : body_keys) all[row++] = key;
+  for (const Key &key : tendon_keys) all[row++] = key;
   for (const Key &key : option_keys) all[row++] = key;
   return all;
 }();

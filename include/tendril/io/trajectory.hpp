@@ -57,6 +57,7 @@ private:
   const Scene &scene_;
   const Elements &elements_;
   bool dynamic_;
+  int tendon_segments_ = 0;
   std::string folder_;
   std::size_t rods_;
   int vertices_, edges_;
@@ -82,6 +83,7 @@ private:
   void writeSkins();       ///< triangles of each rod, and how its points go with edges (SkinPoint)
   void writeColliders();   ///< name, shape, its parameters, and position and rotation without motion
   void writeJoints();      ///< name, type, bodies, point and axis as drawn
+  void writeTendons();     ///< name, actuator, rows of their points, and segments between these
   void writeBodies();      ///< name, shape, its parameters, mass properties as drawn; and what is tied to them
   void writeMaterials();
   void writeXdmf() const;

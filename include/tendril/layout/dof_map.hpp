@@ -84,6 +84,8 @@ public:
   const ByRod<JoinedBody> &bodies() const { return bodies_; }
   const ByRod<BodyPair> &pairs() const { return pairs_; }
   int groups() const { return groups_; } ///< rigid ones of all junctions, and bodies
+  /// First of those of each tendon (Tendon::slots), in the order of the scene.
+  const std::vector<int> &tendonSlots() const { return tendon_slot_; }
   Planes makePlanes() const { return Planes(slot_size, slots_); }
 
   DM dm() const { return dm_; }
@@ -146,7 +148,8 @@ private:
   ByRod<Tie> ties_;
   ByRod<JoinedBody> bodies_;
   ByRod<BodyPair> pairs_;
-  std::vector<Vec3> arms_; ///< of joined vertices
+  std::vector<Vec3> arms_;        ///< of joined vertices
+  std::vector<int> tendon_slot_;
   int groups_ = 0;
   ByRod<TouchingPair> touching_;
   std::vector<RodSet> islands_;  ///< per rod; empty where nothing joins any

@@ -41,6 +41,7 @@ public:
   std::vector<std::vector<EndCouple>> end_couples; ///< per rod
   std::vector<int> support_slot;                   ///< of each support's frame, or -1 where nothing meets it
   std::vector<int> constraint_slot; ///< first of each constraint's slots: that of its target (Constraint::slots)
+  std::vector<int> tendon_slot;     ///< first of those of each tendon (Tendon::slots)
   /// Pins of a rod by their vertices' slots, a vertex once: how stiff they hold it [N/m].
   using Pins = std::vector<std::pair<int, double>>;
 
@@ -68,6 +69,9 @@ public:
   std::span<const int> supportsOf(int rod) const { return supports_.of(rod); }
   std::span<const int> forcesOf(int rod) const { return forces_.of(rod); }
   std::span<const int> momentsOf(int rod) const { return moments_.of(rod); }
+  std::span<const int> tendonsOf(int rod) const { return tendons_.of(rod); }
+  /// Of a tendon, [begin, end).
+  std::pair<int, int> tendonSlots(int k) const { return {tendon_slot[k], tendon_slot[k] + tendon_slots_[k]}; }
   const Pins &pinsOf(int rod) const { return pins_.empty() ? no_pins_ : pins_[rod]; }
   double length(int rod) const { return length_[rod]; } ///< at rest [m]
   std::span<const JoinedEdge> joinedEdges(RodSet set) const { return joined_edges_.of(set); }
@@ -81,7 +85,7 @@ public:
   std::span<const BodyPair> pairs(RodSet set) const { return pairs_.of(set); }
   /// By the joint's number in the scene.
   const BodyPair &pairOf(int joint) const { return pairs_.items[place_of_joint_[joint]]; }
-  /// Of a body and the obstacles that it touches.
+  /// Of a body and what presses on it (Scene::isPressed).
   const BodyPair &pairOfBody(int body) const { return pairs_.items[place_of_contact_[body]]; }
   /// Of a body with what rods tied to it add, as drawn.
   const MassProperties &bodyMass(int body) const { return body_mass_[body]; }
@@ -97,9 +101,10 @@ public:
   Elements(const Scene &scene, const DofMap &dofs);
 
 private:
-  NumbersByRod supports_, forces_, moments_;
+  NumbersByRod supports_, forces_, moments_, tendons_;
   Planes constants_, cells_;
-  std::vector<double> length_; ///< per rod
+  std::vector<double> length_;    ///< per rod
+  std::vector<int> tendon_slots_; ///< how many each has
   ByRod<JoinedEdge> joined_edges_;
   ByRod<JoinedVertex> joined_vertices_;
   ByRod<Tie> ties_;

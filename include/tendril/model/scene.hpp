@@ -9,6 +9,7 @@
 #include "tendril/model/material.hpp"
 #include "tendril/model/skin.hpp"
 #include "tendril/model/strain.hpp"
+#include "tendril/model/tendon.hpp"
 
 #include <cstdint>
 #include <optional>
@@ -144,9 +145,15 @@ struct Scene {
   std::vector<Body> held_bodies; ///< those at rest, or that move as they are told: what is tied to them, supports hold
   std::vector<Attachment> attachments;
   std::vector<Joint> joints; ///< between bodies
-  /// Gives every body its first rod, in the present order of rods: one that is tied to it, or to what joints join it
-  /// to.
+  std::vector<Tendon> tendons;
+  /// Gives every body its first rod, in the present order of rods: one that is tied to it, or to what joints and
+  /// tendons join it to; and every tendon its own.
   void hostBodies();
+  /// Bodies that a tendon pulls on, and rods, with those that bodies have; each once.
+  std::vector<int> bodiesOf(const Tendon &tendon) const;
+  std::vector<int> rodsOf(const Tendon &tendon) const;
+  /// Whether a tendon runs through points beside the axis of a rod, which its twist moves.
+  bool tendonsTwist() const;
   /// Whether junctions, ties or bodies join rods.
   bool isJoined() const;
   std::vector<NodalForce> forces;
@@ -183,6 +190,8 @@ struct Scene {
     const ContactSettings &contact = bodies[body].contact;
     return contact.on && (!colliders.empty() || contact.bodies);
   }
+  /// Whether more acts on a body itself than joints and what is tied to it: contact, or a tendon.
+  bool isPressed(int body) const;
   /// Whether any rod touches others or itself.
   bool touchesRods() const {
     if (whole) return whole->touches_rods;

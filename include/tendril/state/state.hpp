@@ -201,6 +201,8 @@ Frame supportFrame(const Support &support, double motion_time);
 void setTarget(const Constraint &constraint, int slot, double motion_time, Configuration &c);
 /// Of a joint: the target of its drive, and where its parent is one that no step moves.
 void setTarget(const Joint &joint, const BodyPair &pair, double motion_time, Configuration &c);
+/// Of a tendon: the input of its actuator, and the points that are told. \param slot the first of its own
+void setTarget(const Tendon &tendon, int slot, double motion_time, Configuration &c);
 void setTargets(const Scene &scene, const Elements &elements, double motion_time, Configuration &c);
 
 /// Visits the cells of a rod: `visit(slot, frame0, frame1, count)`, as Packs of `count` regular cells, then one by one

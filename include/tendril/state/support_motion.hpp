@@ -34,6 +34,7 @@ private:
   std::vector<std::vector<int>> moving_;         ///< supports that move, per rod
   std::vector<std::vector<int>> moving_targets_; ///< constraints that move, per rod; empty where the scene has none
   std::vector<int> moving_joints_;               ///< whose parents or drives move
+  std::vector<int> moving_tendons_;              ///< whose points or inputs move
   double from_time_ = 0, to_time_ = 0;           ///< of the turn under way
   std::vector<std::vector<Turned>> turned_;      ///< frames that turn in this step, per rod
   std::string beyond_barrier_;

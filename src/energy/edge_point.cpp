@@ -1,4 +1,4 @@
-#include "tendril/contact/edge_point.hpp"
+#include "tendril/energy/edge_point.hpp"
 
 #include "tendril/energy/constraint.hpp"
 #include "tendril/geometry/rotation.hpp"

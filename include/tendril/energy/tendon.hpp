@@ -1,0 +1,112 @@
+#pragma once
+/// \file tendon.hpp
+/// Kernels of tendons (see Tendon): their displacement with exact derivatives, and what actuators do with it.
+/// docs/theory.md derives them.
+
+#include "tendril/energy/carrier.hpp"
+
+namespace tendril {
+
+struct WayLength;
+
+/// What an actuator does at a displacement: potential over a step [J], tension [N], its derivative [N/m].
+struct Pull {
+  double value = 0, tension = 0, stiffness = 0;
+};
+/// A damper over a step: damping times `rate` times the way from `rest`.
+struct TendonDamper {
+  double rate = 0; ///< one over time [1/s], 0 where none acts
+  double rest = 0; ///< [m]
+};
+/// Tension is nowhere negative, unless the actuator may push; where there is none, the potential is zero. A muscle of
+/// length L with the pressure p beyond its least one, b the length of a thread of its braid and n its turns, has the
+/// tension p b^2/(4 pi n^2) (3 L^2/b^2 - 1) (Chou and Hannaford 1996, eq. 8).
+/// \param input target [m], tension [N] or pressure [Pa]
+Pull pullOf(const Actuator &actuator, double displacement, double input, const TendonDamper &damper = {});
+/// What of it a state stores: the energy of a spring [J]. Tensions and pressures that are given do work instead.
+double storedBy(const Actuator &actuator, double displacement, double input);
+/// Work on what is pulled between two displacements at an input that is given, without its damper; 0 of a spring [J].
+double workBetween(const Actuator &actuator, double from, double to, double input);
+
+/// Where a point of a tendon is as drawn [m].
+Vec3 asDrawn(const Scene &scene, const Waypoint &point);
+/// Length of a segment as drawn [m].
+double segmentAsDrawn(const Scene &scene, const Tendon &tendon, const Tendon::Segment &segment);
+
+/// A tendon in a scene that is laid out.
+class TendonPath {
+public:
+  struct Derivatives {
+    Eigen::VectorXd gradient; ///< by the variables of all carriers, one after the other (Carrier::variables)
+    Eigen::MatrixXd hessian;  ///< empty where it is not asked for
+  };
+
+  /// \param index of the tendon
+  TendonPath(const Scene &scene, const Elements &elements, int index);
+  const Tendon &tendon() const { return scene_->tendons[std::size_t(index_)]; }
+  int slot() const { return slot_; } ///< first of its own
+  /// What it pulls on, each once.
+  const std::vector<Carrier> &carriers() const { return carriers_; }
+
+  /// Of all segments [m].
+  double length(const Configuration &c) const;
+  /// Zero as drawn [m]; infinite where points that follow each other are one, or lie in what it winds round.
+  double displacement(const Configuration &c) const { return length(c) - drawn_ + coordinates(c); }
+  Derivatives derivatives(const Configuration &c, bool second) const;
+  /// Places of its points [m], and with those between them where it winds round something.
+  std::vector<Vec3> points(const Configuration &c) const;
+  std::vector<Vec3> drawn(const Configuration &c) const;
+  /// Its displacement by the place of each point that is told, in their order.
+  std::vector<Vec3> byTold(const Configuration &c) const;
+  /// Rate of its displacement at a state [m/s].
+  double rate(const State &state, const Configuration &c) const;
+  double input(const Configuration &c) const { return c.positionAt(slot_)[0]; }
+  /// How far rounding blurs its displacement [m].
+  double blur(const Configuration &c) const;
+
+private:
+  /// A point in two words.
+  struct Place {
+    Vec3 high, low;
+    Vec3 from(const Place &other) const { return (high - other.high) + (low - other.low); }
+  };
+  struct Carried {
+    int carrier = -1, told = -1; ///< which carries it, or the slot of one that is told
+    CarriedPoint point{0, Vec3::Zero()};
+  };
+  /// A cylinder or sphere, with its own axes as columns: as drawn in those of the world, later turned with its body.
+  struct Round {
+    Carried centre;
+    Mat3 axes;
+  };
+  const Scene *scene_;
+  const Elements *elements_;
+  int index_, slot_;
+  std::vector<Carrier> carriers_;
+  std::vector<Carried> points_;
+  std::vector<Round> rounds_;
+  double drawn_ = 0; ///< its length
+
+  int numberOf(const Carrier &carrier);
+  Place placeOf(const Carried &point, const Configuration &c) const;
+  Mat3 axesOf(const Round &round, const Configuration &c) const;
+  double coordinates(const Configuration &c) const;
+  /// Of a segment, by the places of its ends as what it winds round sees them, in the axes of the world.
+  WayLength wayOf(const Tendon::Segment &segment, const Configuration &c) const;
+  void addSegment(const Tendon::Segment &segment, const Configuration &c, bool second, Derivatives &out) const;
+  void addJoint(const Tendon::Pull &pull, const Configuration &c, bool second, Derivatives &out) const;
+};
+
+/// What a tendon does at a state.
+struct TendonReading {
+  double displacement = 0, length = 0;             ///< [m]
+  double rate = 0;                                 ///< of the displacement [m/s]
+  double tension = 0;                              ///< [N]
+  std::vector<Vec3> points;                        ///< [m]
+  double power() const { return -tension * rate; } ///< of the actuator on what it pulls on [W]
+};
+/// \param c of the state \param dynamic whether dampers act
+TendonReading readTendon(const Scene &scene, const Elements &elements, int index, const State &state,
+                         const Configuration &c, bool dynamic);
+
+} // namespace tendril

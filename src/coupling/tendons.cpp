@@ -1,0 +1,140 @@
+/// Tendons with their actuators. Every one has all derivatives between any two of what it pulls on, that of tension by
+/// displacement included, as blocks of pairs: no tendon is a column of its own, and slack ones cost what taut ones do.
+#include "tendril/coupling/couplings.hpp"
+#include "tendril/energy/tendon.hpp"
+
+namespace tendril {
+namespace {
+
+class Tendons final : public Term {
+public:
+  Tendons(const Scene &scene, const Elements &elements)
+      : elements_(elements), dampers_(scene.tendons.size()), by_rod_(scene.tendons, elements.rods.size()) {
+    for (int k = 0; k < int(scene.tendons.size()); ++k) paths_.emplace_back(scene, elements, k);
+  }
+  bool couplesPositions() const override { return true; }
+  bool joinsPositions() const override { return true; }
+  bool roundsAsStrains() const override { return false; }
+
+  /// Of what tendons pull on all pairs are together for good.
+  void findTouching(const State &, const Configuration &, const Planes &, const Step &, double,
+                    std::vector<TouchingPair> &pairs) override {
+    first_number_.clear();
+    begin_ = int(pairs.size());
+    for (const TendonPath &path : paths_) {
+      first_number_.push_back(int(pairs.size()));
+      forPairs(path, [&](std::size_t a, std::size_t b) {
+        TouchingPair p = pairOf(path.carriers()[a], path.carriers()[b]);
+        p.number = int(pairs.size());
+        pairs.push_back(p);
+      });
+    }
+    end_ = int(pairs.size());
+  }
+  bool nearlyTouch(const TouchingPair &pair, const Configuration &) const override {
+    return pair.number >= begin_ && pair.number < end_;
+  }
+
+  void beginStep(const State &, const Configuration &start, const Step &step, int rod) override {
+    for (const int k : by_rod_.of(rod)) {
+      const TendonPath &path = paths_[std::size_t(k)];
+      TendonDamper &damper = dampers_[std::size_t(k)];
+      damper = {};
+      if (step.isStatic() || !path.tendon().dissipates()) continue;
+      damper.rate = 1 / step.dampingDt();
+      damper.rest = dampedRest(step, path.displacement(start), std::size_t(path.slot()));
+    }
+  }
+  double energy(const Configuration &c, int rod) const override {
+    double sum = 0;
+    for (const int k : by_rod_.of(rod)) sum += pull(k, c).value;
+    return sum;
+  }
+  double noise(const Configuration &c, int rod, double) const override {
+    double sum = 0;
+    for (const int k : by_rod_.of(rod)) {
+      const Pull p = pull(k, c);
+      const double blur = paths_[std::size_t(k)].blur(c);
+      sum += (std::abs(p.tension) + p.stiffness * blur) * blur;
+    }
+    return sum;
+  }
+  void addEnergies(const State &, const Configuration &c, double, int rod, EnergyBudget &out) const override {
+    for (const int k : by_rod_.of(rod)) {
+      const TendonPath &path = paths_[std::size_t(k)];
+      out.constraint += storedBy(path.tendon().actuator, path.displacement(c), path.input(c));
+    }
+  }
+  void addDerivatives(const Configuration &, int, Derivatives &, HessianKind) const override {} // none is of one alone
+  void addBetween(const Configuration &c, RodSet island, Derivatives &out, HessianKind kind) const override {
+    for (int r = island.begin; r < island.end; ++r)
+      for (const int k : by_rod_.of(r)) add(k, c, kind, out);
+  }
+  /// Of its own slots the first has the input, whose derivative is that of a target; the others have told points.
+  std::array<Vec3, 2> actionFrom(int slot, const Configuration &c, int rod) const override {
+    std::array<Vec3, 2> action{Vec3::Zero(), Vec3::Zero()};
+    for (const int k : by_rod_.of(rod)) {
+      const TendonPath &path = paths_[std::size_t(k)];
+      if (slot < path.slot() || slot >= path.slot() + path.tendon().slots()) continue;
+      const double tension = pull(k, c).tension;
+      action[0] = slot == path.slot() ? Vec3(-tension, 0, 0)
+                                      : Vec3(tension * path.byTold(c)[std::size_t(slot - path.slot() - 1)]);
+    }
+    return action;
+  }
+
+private:
+  const Elements &elements_;
+  std::vector<TendonPath> paths_;
+  std::vector<TendonDamper> dampers_;
+  NumbersByRod by_rod_;
+  std::vector<int> first_number_; ///< of pairs, per tendon
+  int begin_ = 0, end_ = 0;       ///< of all of them
+
+  Pull pull(int k, const Configuration &c) const {
+    const TendonPath &path = paths_[std::size_t(k)];
+    const double x = path.displacement(c);
+    if (!std::isfinite(x)) return {HUGE_VAL, 0, 0};
+    return pullOf(path.tendon().actuator, x, path.input(c), dampers_[std::size_t(k)]);
+  }
+  template <class Visit> static void forPairs(const TendonPath &path, Visit visit) {
+    for (std::size_t b = 0; b < path.carriers().size(); ++b)
+      for (std::size_t a = 0; a < b; ++a) visit(a, b);
+  }
+
+  void add(int k, const Configuration &c, HessianKind kind, Derivatives &out) const {
+    constexpr int width = Carrier::variables;
+    const TendonPath &path = paths_[std::size_t(k)];
+    const Pull p = pull(k, c);
+    if (p.tension == 0) return;
+    const bool any = kind != HessianKind::none, bent = any && kind != HessianKind::gauss_newton;
+    const TendonPath::Derivatives d = path.derivatives(c, bent);
+    Eigen::MatrixXd hessian;
+    if (any) hessian = p.stiffness * d.gradient * d.gradient.transpose();
+    if (bent) hessian += p.tension * d.hessian;
+    auto block = [&](std::size_t a, std::size_t b) -> Carrier::Hessian {
+      if (!any) return Carrier::Hessian::Zero();
+      return hessian.block<width, width>(width * Eigen::Index(a), width * Eigen::Index(b));
+    };
+    for (std::size_t a = 0; a < path.carriers().size(); ++a)
+      addOwn(elements_, path.carriers()[a], p.tension * d.gradient.segment<width>(width * Eigen::Index(a)), block(a, a),
+             kind, out);
+    int number = first_number_[std::size_t(k)];
+    if (!any) return;
+    forPairs(path, [&](std::size_t a, std::size_t b) {
+      const bool swapped = path.carriers()[a].rod < path.carriers()[b].rod; // as pairOf
+      const Carrier::Hessian h = swapped ? block(b, a) : block(a, b);
+      double *const to = out.blocks.touching(number++);
+      for (int i = 0; i < width; ++i)
+        for (int j = 0; j < width; ++j) to[width * i + j] += h(i, j);
+    });
+  }
+};
+
+} // namespace
+
+std::unique_ptr<Term> makeTendons(const Scene &scene, const Elements &elements) {
+  return scene.tendons.empty() ? nullptr : std::make_unique<Tendons>(scene, elements);
+}
+
+} // namespace tendril

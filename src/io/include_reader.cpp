@@ -1,0 +1,202 @@
+#include "tendril/io/include_reader.hpp"
+
+#include "tendril/io/yaml.hpp"
+
+#include <algorithm>
+
+namespace tendril {
+namespace {
+
+void turn(Motion &motion, const Mat3 &rotation) {
+  for (Vec3 *v : {&motion.velocity, &motion.angular_velocity, &motion.arm}) *v = rotation * *v;
+  for (Motion::Key &row : motion.table) {
+    row.displacement = rotation * row.displacement;
+    row.rotation = rotation * row.rotation;
+  }
+}
+
+void turn(Frame &frame, const Mat3 &rotation) {
+  frame.tangent = rotation * frame.tangent;
+  frame.director = rotation * frame.director;
+}
+
+std::shared_ptr<const SkinRecipe> moved(const SkinRecipe &skin, const std::function<Vec3(const Vec3 &)> &place) {
+  auto out = std::make_shared<SkinRecipe>(skin);
+  if (!skin.mesh) return out;
+  auto mesh = std::make_shared<TriangleMesh>(*skin.mesh);
+  for (Vec3 &x : mesh->vertices) x = place(x);
+  out->mesh = mesh;
+  return out;
+}
+
+} // namespace
+
+void place(Scene &scene, std::vector<Drawing> &drawings, const Mat3 &rotation, const Vec3 &translation) {
+  const std::function<Vec3(const Vec3 &)> place = [=](const Vec3 &x) { return Vec3(rotation * x + translation); };
+  for (std::size_t r = 0; r < scene.rods.size(); ++r) {
+    Rod &rod = scene.rods[r];
+    for (Vec3 &x : rod.position) x = place(x);
+    for (Vec3 &d : rod.director) d = rotation * d;
+    rod.initial_velocity = rotation * rod.initial_velocity;
+    if (rod.skin) rod.skin = moved(*rod.skin, place);
+    if (drawings[r].curve) drawings[r].curve = [place, curve = drawings[r].curve](double s) { return place(curve(s)); };
+  }
+  for (Support &s : scene.supports) {
+    turn(s.frame, rotation);
+    turn(s.motion, rotation);
+  }
+  for (Constraint &c : scene.constraints) {
+    c.point = place(c.point);
+    turn(c.frame, rotation);
+    turn(c.motion, rotation);
+  }
+  for (std::vector<Body> *bodies : {&scene.bodies, &scene.held_bodies})
+    for (Body &b : *bodies) {
+      b.own = b.own.moved(rotation, translation);
+      b.position = place(b.position);
+      b.rotation = rotation * b.rotation;
+      for (Vec3 *v : {&b.velocity, &b.angular_velocity, &b.force, &b.torque}) *v = rotation * *v;
+      turn(b.motion, rotation);
+    }
+  for (Attachment &a : scene.attachments) turn(a.frame, rotation);
+  for (Joint &j : scene.joints) {
+    j.point = place(j.point);
+    j.axes = rotation * j.axes;
+    turn(j.motion, rotation);
+  }
+  for (Tendon &t : scene.tendons) {
+    for (Waypoint &p : t.points) {
+      if (p.rod < 0) p.point = place(p.point);
+      turn(p.motion, rotation);
+    }
+    for (Wrap &w : t.wraps) {
+      w.centre = place(w.centre);
+      w.axis = rotation * w.axis;
+    }
+  }
+  for (NodalForce &f : scene.forces) f.force = rotation * f.force;
+  for (EdgeMoment &m : scene.moments) m.moment = rotation * m.moment;
+  for (Collider &c : scene.colliders) {
+    c.position = place(c.position);
+    c.rotation = rotation * c.rotation;
+    turn(c.motion, rotation);
+  }
+}
+
+void append(SceneFile part, const std::string &prefix, const YamlValue &where, SceneFile &out) {
+  Scene &scene = out.scene, &from = part.scene;
+  const int rods = int(scene.rods.size()), bodies = int(scene.bodies.size()), held = int(scene.held_bodies.size()),
+            supports = int(scene.supports.size()), joints = int(scene.joints.size()),
+            colliders = int(scene.colliders.size()), all_bodies = int(out.bodies.size());
+  auto clash = [&](const std::string &what, const std::string &name) {
+    where.fail("there is " + what + " '" + name + "' already; write another 'prefix'");
+  };
+  auto shift = [](int &number, int by) {
+    if (number >= 0) number += by;
+  };
+  auto named = [&](std::string &name) { name = prefix + name; };
+  auto layered = [&](std::string &layer) {
+    if (!layer.empty()) layer = prefix + layer;
+  };
+  auto meet = [&](ContactSettings &contact) {
+    for (int &k : contact.passes) k += colliders;
+    contact.apart_from <<= out.ignored_pairs;
+    contact.apart_to <<= out.ignored_pairs;
+  };
+  if (out.ignored_pairs + part.ignored_pairs > 64)
+    where.fail("with it more than 64 pairs of rods and bodies pass through each other by 'ignore', more than fit");
+  for (Rod &rod : from.rods) {
+    named(rod.name);
+    layered(rod.layer);
+    meet(rod.contact);
+    if (out.names.isTaken(rod.name)) clash("a rod", rod.name);
+  }
+  for (const Rod &rod : from.rods) out.names.add(rod.name);
+  for (std::vector<Body> *list : {&from.bodies, &from.held_bodies})
+    for (Body &b : *list) {
+      named(b.name);
+      layered(b.layer);
+      meet(b.contact);
+      b.rod += rods;
+      if (out.body_numbers.count(b.name)) clash("a body", b.name);
+    }
+  for (const auto &[name, number] : part.body_numbers) out.body_numbers[prefix + name] = number + all_bodies;
+  for (SceneFile::BodyPlace place : part.bodies) {
+    place.index += place.held ? held : bodies;
+    out.bodies.push_back(place);
+  }
+  for (Support &s : from.supports) s.rod += rods;
+  for (Constraint &c : from.constraints) {
+    named(c.name);
+    c.rod += rods;
+    shift(c.to_rod, rods);
+    shift(c.to_body, bodies);
+  }
+  for (Attachment &a : from.attachments) {
+    named(a.name);
+    a.rod += rods;
+    a.body += bodies;
+  }
+  for (Junction &j : from.junctions) {
+    named(j.name);
+    for (Junction::Member &m : j.members) m.rod += rods;
+  }
+  for (Joint &j : from.joints) {
+    named(j.name);
+    j.child += bodies;
+    shift(j.parent, bodies);
+    j.rod += rods;
+  }
+  for (Tendon &t : from.tendons) {
+    named(t.name);
+    t.rod += rods;
+    for (Waypoint &p : t.points) {
+      shift(p.body, bodies);
+      shift(p.rod, rods);
+    }
+    for (Wrap &w : t.wraps) shift(w.body, bodies);
+    for (Tendon::Pull &p : t.joints) p.joint += joints;
+    for (const Tendon &other : scene.tendons)
+      if (other.name == t.name) clash("a tendon", t.name);
+  }
+  for (NodalForce &f : from.forces) f.rod += rods;
+  for (EdgeMoment &m : from.moments) m.rod += rods;
+  for (Collider &c : from.colliders) {
+    named(c.name);
+    layered(c.layer);
+    for (const Collider &other : scene.colliders)
+      if (other.name == c.name) clash("a collider", c.name);
+  }
+  for (const std::string &name : part.constraint_names)
+    if (!out.constraint_names.insert(prefix + name).second) clash("a constraint", prefix + name);
+  for (const std::string &name : part.joint_names)
+    if (!out.joint_names.insert(prefix + name).second) clash("a joint", prefix + name);
+  for (const auto &[vertex, name] : part.joined) out.joined[{vertex.first + rods, vertex.second}] = prefix + name;
+  for (const auto &[vertex, name] : part.attached) out.attached[{vertex.first + rods, vertex.second}] = prefix + name;
+  for (const auto &[vertex, numbers] : part.supports_at)
+    for (const int k : numbers) out.supports_at[{vertex.first + rods, vertex.second}].push_back(k + supports);
+  out.ignored_pairs += part.ignored_pairs;
+  auto add = [](auto &to, auto &items) {
+    to.insert(to.end(), std::make_move_iterator(items.begin()), std::make_move_iterator(items.end()));
+  };
+  add(scene.rods, from.rods);
+  add(scene.supports, from.supports);
+  add(scene.constraints, from.constraints);
+  add(scene.junctions, from.junctions);
+  add(scene.bodies, from.bodies);
+  add(scene.held_bodies, from.held_bodies);
+  add(scene.attachments, from.attachments);
+  add(scene.joints, from.joints);
+  add(scene.tendons, from.tendons);
+  add(scene.forces, from.forces);
+  add(scene.moments, from.moments);
+  add(scene.colliders, from.colliders);
+  add(out.drawings, part.drawings);
+  add(out.notes, part.notes);
+  add(out.source.paths, part.source.paths);
+  for (auto &file : part.source.files)
+    if (std::find(out.source.files.begin(), out.source.files.end(), file) == out.source.files.end())
+      out.source.files.push_back(file);
+}
+
+} // namespace tendril
