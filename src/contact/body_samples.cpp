@@ -72,7 +72,7 @@ std::shared_ptr<const Shape> solidOf(const Body &body) {
   if (body.shape == "capsule") return makeCapsule(body.size[0], body.size[1]);
   if (body.shape == "cylinder") return makeCylinder(body.size[0], body.size[1]);
   if (body.shape == "box") return makeBox(body.size);
-  if (body.mesh) return makeMesh(*body.mesh);
+  if (body.mesh) return makeMesh(*body.mesh, body.cell);
   return nullptr;
 }
 
@@ -84,7 +84,8 @@ double loadOn(const Scene &scene, const Elements &elements, int b) {
 
 /// Of a point so far from what a motion turns about.
 static double fastest(const Motion &motion, double arm) {
-  double most = motion.velocity.norm() + arm * motion.angular_velocity.norm();
+  double most =
+      motion.velocity.norm() + arm * motion.angular_velocity.norm() + pi / motion.period * motion.amplitude.norm();
   for (const Motion::Key &k : motion.table)
     most = std::max(most, motion.velocityAt(k.time).norm() + arm * motion.angularVelocityAt(k.time).norm());
   return most;

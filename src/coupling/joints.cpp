@@ -4,6 +4,7 @@
 /// that say the same twice do no harm, and negative pivots count unstable motions (augmented Lagrangian; D. P.
 /// Bertsekas, *Constrained Optimization and Lagrange Multiplier Methods*, 1982, 2.2 and 4.2). docs/theory.md has more.
 #include "tendril/coupling/couplings.hpp"
+#include "tendril/coupling/held_bodies.hpp"
 #include "tendril/energy/joint.hpp"
 #include "tendril/state/spin_stage.hpp"
 
@@ -21,36 +22,10 @@ constexpr int drive_force = 6, range_force = 7;
 class Joints final : public Term {
 public:
   Joints(const Scene &scene, const Elements &elements)
-      : scene_(scene), elements_(elements), work_(scene.joints.size()), held_(scene.bodies.size()) {
+      : scene_(scene), elements_(elements), work_(scene.joints.size()), held_(whatHolds(scene, elements)) {
     for (const BodyPair &p : elements.pairs({0, int(elements.rods.size())}))
       if (p.joint >= 0) pairs_.items.push_back(p);
     pairs_.sort(elements.rods.size());
-    auto hold = [&](int body, double stiffness, double turning, double arm) {
-      held_[std::size_t(body)].stiffness += stiffness;
-      held_[std::size_t(body)].turning += turning + stiffness * arm * arm;
-    };
-    for (const JoinedVertex &j : elements.joinedVertices({0, int(elements.rods.size())})) {
-      if (!j.isOnBody()) continue;
-      const double arm = elements.armAsDrawn(j).norm();
-      if (!j.isVertex()) {
-        hold(j.body, scene.constraints[std::size_t(j.attachment)].stiffness, 0, arm);
-        continue;
-      }
-      const Rod &rod = scene.rods[std::size_t(j.rod)];
-      const auto [k1, k2] = rod.material.flexural_stiffness;
-      for (const int edge : {rod.edgeBefore(j.vertex), rod.edgeAfter(j.vertex)})
-        if (edge >= 0) {
-          const double length = rod.edge(edge).norm();
-          hold(j.body, rod.material.axial_stiffness / length, 4 * std::max(k1, k2) / length, arm);
-        }
-    }
-    for (const Constraint &c : scene.constraints)
-      if (c.isToBody() && !c.isPin()) hold(c.to_body, 0, c.stiffness, 0);
-    for (int b = 0; b < int(held_.size()); ++b) { // loads over sizes
-      const Body &body = scene.bodies[std::size_t(b)];
-      const double size = elements.bodySize(b), weight = body.gravity ? body.own.mass * scene.gravity.norm() : 0;
-      hold(b, (weight + body.force.norm() + body.torque.norm() / size) / size, 0, size);
-    }
   }
   bool roundsAsStrains() const override { return false; }
 
@@ -219,9 +194,6 @@ public:
   }
 
 private:
-  struct Held {
-    double stiffness = 0, turning = 0; ///< of what else holds a body [N/m], [N m/rad]
-  };
   struct Work {
     std::array<double, BodyPair::forces> force{}; ///< at the iterate
     const Configuration *iterate = nullptr;       ///< where the end of the range is to be found, or null: it is

@@ -1,5 +1,8 @@
 /// Tendons with their actuators. Every one has all derivatives between any two of what it pulls on, that of tension by
 /// displacement included, as blocks of pairs: no tendon is a column of its own, and slack ones cost what taut ones do.
+/// The tension of a stiff tendon is an unknown of its own, as the axial force of an edge is: what the linearised
+/// displacement asks for. So a step that a stiff tendon begins far from its tension is not lost in what that tension,
+/// many times too large, would do by the curvature of its path.
 #include "tendril/coupling/couplings.hpp"
 #include "tendril/energy/tendon.hpp"
 
@@ -9,8 +12,14 @@ namespace {
 class Tendons final : public Term {
 public:
   Tendons(const Scene &scene, const Elements &elements)
-      : elements_(elements), dampers_(scene.tendons.size()), by_rod_(scene.tendons, elements.rods.size()) {
-    for (int k = 0; k < int(scene.tendons.size()); ++k) paths_.emplace_back(scene, elements, k);
+      : elements_(elements), work_(scene.tendons.size()), by_rod_(scene.tendons, elements.rods.size()) {
+    for (int k = 0; k < int(scene.tendons.size()); ++k) {
+      const TendonPath &path = paths_.emplace_back(scene, elements, k);
+      double size = HUGE_VAL;
+      for (const Carrier &c : path.carriers())
+        size = std::min(size, c.isBody() ? elements.bodySize(c.body()) : elements.restLength()[c.slot[0]]);
+      sizes_.push_back(size);
+    }
   }
   bool couplesPositions() const override { return true; }
   bool joinsPositions() const override { return true; }
@@ -38,12 +47,38 @@ public:
   void beginStep(const State &, const Configuration &start, const Step &step, int rod) override {
     for (const int k : by_rod_.of(rod)) {
       const TendonPath &path = paths_[std::size_t(k)];
-      TendonDamper &damper = dampers_[std::size_t(k)];
-      damper = {};
+      Work &w = work_[std::size_t(k)];
+      w = {};
+      w.at_start = w.tension = pull(k, start).tension;
       if (step.isStatic() || !path.tendon().dissipates()) continue;
-      damper.rate = 1 / step.dampingDt();
-      damper.rest = dampedRest(step, path.displacement(start), std::size_t(path.slot()));
+      w.damper.rate = 1 / step.dampingDt();
+      w.damper.rest = dampedRest(step, path.displacement(start), std::size_t(path.slot()));
     }
+  }
+  /// At the start of a step the plane of axial forces is zero in the slots of tendons.
+  void moveIterate(const Configuration &iterate, int rod) override {
+    for (const int k : by_rod_.of(rod)) {
+      Work &w = work_[std::size_t(k)];
+      w.tension = w.at_start + iterate[Configuration::axial_force][paths_[std::size_t(k)].slot()];
+    }
+  }
+  void setTrialForces(const Configuration &iterate, const Planes &increment, double scale, int rod,
+                      Configuration &trial) const override {
+    for (const int k : by_rod_.of(rod)) {
+      const Work &w = work_[std::size_t(k)];
+      const Pull p = pull(k, iterate);
+      const double now = tensionAt(k, p), wanted = p.tension + p.stiffness * motion(k, iterate, increment),
+                   next = now + scale * (wanted - now);
+      trial[Configuration::axial_force][paths_[std::size_t(k)].slot()] =
+          (paths_[std::size_t(k)].tendon().actuator.compression ? next : std::max(next, 0.0)) - w.at_start;
+    }
+  }
+  double mismatch(const Configuration &c, int rod) const override {
+    double most = 0;
+    for (const int k : by_rod_.of(rod))
+      if (const Pull p = pull(k, c); p.stiffness > 0)
+        most = std::max(most, std::abs(p.tension - tensionAt(k, p)) / (p.stiffness * sizes_[std::size_t(k)]));
+    return most;
   }
   double energy(const Configuration &c, int rod) const override {
     double sum = 0;
@@ -70,6 +105,23 @@ public:
     for (int r = island.begin; r < island.end; ++r)
       for (const int k : by_rod_.of(r)) add(k, c, kind, out);
   }
+  /// Points on bodies go on circles, which stiff tendons must not be the longer for.
+  double addExcess(const Configuration &iterate, const Planes &increment, double scale, const Configuration &trial,
+                   int rod, Planes &force) const override {
+    double most = 0;
+    for (const int k : by_rod_.of(rod)) {
+      const Pull p = pull(k, iterate);
+      if (p.stiffness == 0) continue;
+      const TendonPath &path = paths_[std::size_t(k)];
+      const Eigen::VectorXd by = path.derivatives(iterate, false).gradient;
+      const double excess =
+          path.displacement(trial) - path.displacement(iterate) - scale * motion(k, iterate, increment);
+      if (!std::isfinite(excess)) continue;
+      forVariables(path, [&](Eigen::Index v, int a, int slot) { force[a][slot] += p.stiffness * excess * by[v]; });
+      most = std::max(most, std::abs(excess) / sizes_[std::size_t(k)]);
+    }
+    return most;
+  }
   /// Of its own slots the first has the input, whose derivative is that of a target; the others have told points.
   std::array<Vec3, 2> actionFrom(int slot, const Configuration &c, int rod) const override {
     std::array<Vec3, 2> action{Vec3::Zero(), Vec3::Zero()};
@@ -86,7 +138,12 @@ public:
 private:
   const Elements &elements_;
   std::vector<TendonPath> paths_;
-  std::vector<TendonDamper> dampers_;
+  std::vector<double> sizes_; ///< of the smallest thing that each pulls on [m]
+  struct Work {
+    TendonDamper damper;
+    double at_start = 0, tension = 0; ///< at the start of the step, and at the iterate [N]
+  };
+  std::vector<Work> work_;
   NumbersByRod by_rod_;
   std::vector<int> first_number_; ///< of pairs, per tendon
   int begin_ = 0, end_ = 0;       ///< of all of them
@@ -95,7 +152,25 @@ private:
     const TendonPath &path = paths_[std::size_t(k)];
     const double x = path.displacement(c);
     if (!std::isfinite(x)) return {HUGE_VAL, 0, 0};
-    return pullOf(path.tendon().actuator, x, path.input(c), dampers_[std::size_t(k)]);
+    return pullOf(path.tendon().actuator, x, path.input(c), work_[std::size_t(k)].damper);
+  }
+  /// Where its displacement does not change it, the tension is what the actuator gives.
+  double tensionAt(int k, const Pull &p) const { return p.stiffness > 0 ? work_[std::size_t(k)].tension : p.tension; }
+  /// Calls visit(variable, component, slot).
+  template <class Visit> static void forVariables(const TendonPath &path, Visit visit) {
+    for (std::size_t c = 0; c < path.carriers().size(); ++c)
+      for (int v = 0; v < path.carriers()[c].count(); ++v) {
+        const auto [slot, a] = path.carriers()[c].place(v);
+        visit(Eigen::Index(Carrier::variables * c) + v, a, slot);
+      }
+  }
+  /// Of the displacement, to first order.
+  double motion(int k, const Configuration &c, const Planes &increment) const {
+    const TendonPath &path = paths_[std::size_t(k)];
+    const Eigen::VectorXd by = path.derivatives(c, false).gradient;
+    double sum = 0;
+    forVariables(path, [&](Eigen::Index v, int a, int slot) { sum += by[v] * increment[a][slot]; });
+    return sum;
   }
   template <class Visit> static void forPairs(const TendonPath &path, Visit visit) {
     for (std::size_t b = 0; b < path.carriers().size(); ++b)
@@ -106,19 +181,22 @@ private:
     constexpr int width = Carrier::variables;
     const TendonPath &path = paths_[std::size_t(k)];
     const Pull p = pull(k, c);
-    if (p.tension == 0) return;
+    const double tension = tensionAt(k, p);
+    if (p.tension == 0 && p.stiffness == 0) return;
     const bool any = kind != HessianKind::none, bent = any && kind != HessianKind::gauss_newton;
     const TendonPath::Derivatives d = path.derivatives(c, bent);
     Eigen::MatrixXd hessian;
     if (any) hessian = p.stiffness * d.gradient * d.gradient.transpose();
-    if (bent) hessian += p.tension * d.hessian;
+    if (bent) hessian += tension * d.hessian;
     auto block = [&](std::size_t a, std::size_t b) -> Carrier::Hessian {
       if (!any) return Carrier::Hessian::Zero();
       return hessian.block<width, width>(width * Eigen::Index(a), width * Eigen::Index(b));
     };
     for (std::size_t a = 0; a < path.carriers().size(); ++a)
-      addOwn(elements_, path.carriers()[a], p.tension * d.gradient.segment<width>(width * Eigen::Index(a)), block(a, a),
+      addOwn(elements_, path.carriers()[a], tension * d.gradient.segment<width>(width * Eigen::Index(a)), block(a, a),
              kind, out);
+    forVariables(
+        path, [&](Eigen::Index v, int a, int slot) { out.gradient[a][slot] += (p.tension - tension) * d.gradient[v]; });
     int number = first_number_[std::size_t(k)];
     if (!any) return;
     forPairs(path, [&](std::size_t a, std::size_t b) {

@@ -68,7 +68,7 @@ void addCurvature(const Carrier &carrier, const CarriedPoint &point, const Vec3 
 void addOwn(const Elements &elements, const Carrier &carrier, const Carrier::Gradient &gradient,
             const Carrier::Hessian &hessian, HessianKind kind, Derivatives &out) {
   for (int k = 0; k < carrier.count(); ++k) {
-    const int slot = carrier.slot[k < 3 || k == 6 ? 0 : 1], a = k == 6 ? 3 : k % 3;
+    const auto [slot, a] = carrier.place(k);
     out.gradient[a][slot] += gradient[k];
     out.equilibrium[a][slot] += gradient[k];
   }

@@ -64,6 +64,15 @@ double workBetween(const Actuator &a, double from, double to, double input) {
   return pullOf(a, from, input).value - pullOf(a, to, input).value;
 }
 
+double stiffnessAsDrawn(const Tendon &tendon) {
+  const Actuator &a = tendon.actuator;
+  double most = a.input;
+  for (const Motion::Key &row : a.input_motion.table) most = std::max(most, row.displacement[0]);
+  if (a.kind == Actuator::Kind::displacement) return a.stiffness;
+  if (a.kind != Actuator::Kind::mckibben) return 0;
+  return 6 * muscleFactor(a, most) * a.muscle_length / (a.braid_length * a.braid_length);
+}
+
 Vec3 asDrawn(const Scene &scene, const Waypoint &p) {
   if (p.rod < 0) return p.point;
   const Rod &rod = scene.rods[std::size_t(p.rod)];

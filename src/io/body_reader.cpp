@@ -13,8 +13,9 @@
 namespace tendril {
 namespace {
 
-constexpr MotionKeys body_motion_keys{"bodies[].motion", "bodies[].motion.velocity", "bodies[].motion.angular_velocity",
-                                      "bodies[].motion.table"};
+constexpr MotionKeys body_motion_keys{
+    "bodies[].motion",           "bodies[].motion.velocity", "bodies[].motion.angular_velocity",
+    "bodies[].motion.amplitude", "bodies[].motion.period",   "bodies[].motion.table"};
 constexpr const char *shape_names = "box, sphere, capsule, cylinder or mesh";
 
 /// A closed surface.
@@ -70,6 +71,7 @@ constexpr BodyShapeKey body_shape_keys[] = {
      }},
     {"bodies[].mesh", [](YamlMap &map, Body &out, Mat3 &) {
        out.mesh = readSurface(map);
+       if (map.has("bodies[].mesh.cell")) out.cell = map.number("bodies[].mesh.cell");
        return meshMass(*out.mesh, 1);
      }}};
 
@@ -314,7 +316,13 @@ void readBody(const YamlValue &value, const ContactSettings &contact, SceneFile 
   body.force = map.vector("bodies[].force");
   body.torque = map.vector("bodies[].torque");
   readContact(map, contact, body);
-  if (body.contact.touchesBodies()) body.solid = solidOf(body);
+  if (body.contact.touchesBodies()) {
+    try {
+      body.solid = solidOf(body);
+    } catch (const std::invalid_argument &e) {
+      map.at("bodies[].mesh").fail(e.what());
+    }
+  }
   if (map.has("bodies[].layer")) body.layer = readName(map.at("bodies[].layer"));
   const bool held = map.flag("bodies[].fixed") || map.has("bodies[].motion");
   if (map.has("bodies[].motion")) {

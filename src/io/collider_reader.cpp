@@ -19,8 +19,9 @@ Vec3 axisOf(YamlMap &map, KeyOf<KeyType::vector> key) {
 
 namespace {
 
-constexpr MotionKeys collider_motion_keys{"colliders[].motion", "colliders[].motion.velocity",
-                                          "colliders[].motion.angular_velocity", "colliders[].motion.table"};
+constexpr MotionKeys collider_motion_keys{
+    "colliders[].motion",           "colliders[].motion.velocity", "colliders[].motion.angular_velocity",
+    "colliders[].motion.amplitude", "colliders[].motion.period",   "colliders[].motion.table"};
 
 /// Endless where it is not given.
 double lengthOf(YamlMap &map, KeyOf<KeyType::number> key) { return map.has(*key) ? map.number(key) : HUGE_VAL; }
@@ -263,7 +264,7 @@ void readIgnored(YamlMap &scene, SceneFile &out) {
   if (!scene.has("contact")) return;
   YamlMap contact(scene.at("contact"), "contact");
   if (!contact.has("contact.ignore")) return;
-  int entries = 0;
+  int &entries = out.ignored_pairs;
   for (const YamlValue &value : contact.at("contact.ignore").items()) {
     YamlMap map(value, "contact.ignore");
     std::vector<Named> two;

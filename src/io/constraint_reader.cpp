@@ -8,8 +8,9 @@
 namespace tendril {
 namespace {
 
-constexpr MotionKeys constraint_motion_keys{"constraints[].motion", "constraints[].motion.velocity",
-                                 "constraints[].motion.angular_velocity", "constraints[].motion.table"};
+constexpr MotionKeys constraint_motion_keys{
+    "constraints[].motion",           "constraints[].motion.velocity", "constraints[].motion.angular_velocity",
+    "constraints[].motion.amplitude", "constraints[].motion.period",   "constraints[].motion.table"};
 
 double stiffestTurning(const Material &m) {
   return std::max({m.flexural_stiffness[0], m.flexural_stiffness[1], m.torsional_stiffness});

@@ -1,5 +1,6 @@
 #include "tendril/io/include_reader.hpp"
 
+#include "tendril/energy/tendon.hpp"
 #include "tendril/io/yaml.hpp"
 
 #include <algorithm>
@@ -8,7 +9,7 @@ namespace tendril {
 namespace {
 
 void turn(Motion &motion, const Mat3 &rotation) {
-  for (Vec3 *v : {&motion.velocity, &motion.angular_velocity, &motion.arm}) *v = rotation * *v;
+  for (Vec3 *v : {&motion.velocity, &motion.angular_velocity, &motion.amplitude, &motion.arm}) *v = rotation * *v;
   for (Motion::Key &row : motion.table) {
     row.displacement = rotation * row.displacement;
     row.rotation = rotation * row.rotation;
@@ -80,6 +81,78 @@ void place(Scene &scene, std::vector<Drawing> &drawings, const Mat3 &rotation, c
     c.position = place(c.position);
     c.rotation = rotation * c.rotation;
     turn(c.motion, rotation);
+  }
+}
+
+/// What forces act in a mechanism, about: its residuals are told by it where nothing has weight [N].
+static double forceOf(const Scene &scene, const Body &body, double size) {
+  double force = body.own.mass * scene.gravity.norm() + body.force.norm() + body.torque.norm() / size;
+  for (const Joint &j : scene.joints) force = std::max(force, j.drive_stiffness / size);
+  for (const Tendon &t : scene.tendons)
+    force = std::max(
+        {force, 1e-3 * size * stiffnessAsDrawn(t), t.actuator.kind == Actuator::Kind::force ? t.actuator.input : 0});
+  return force > 0 ? force : body.own.mass * size;
+}
+
+void carryBodies(SceneFile &out) {
+  Scene &scene = out.scene;
+  const std::size_t count = scene.bodies.size();
+  std::vector<int> first(count);
+  std::vector<char> has_rod(count, false), joined(count, false);
+  for (std::size_t b = 0; b < count; ++b) first[b] = int(b);
+  auto rootOf = [&](int b) {
+    while (first[std::size_t(b)] != b) b = first[std::size_t(b)];
+    return b;
+  };
+  auto join = [&](int a, int b) {
+    a = rootOf(a);
+    b = rootOf(b);
+    first[std::size_t(std::max(a, b))] = std::min(a, b);
+  };
+  for (const Attachment &a : scene.attachments) has_rod[std::size_t(a.body)] = true;
+  for (const Constraint &c : scene.constraints)
+    if (c.isToBody()) has_rod[std::size_t(c.to_body)] = true;
+  for (const Joint &j : scene.joints) {
+    joined[std::size_t(j.child)] = true;
+    if (j.parent >= 0) join(j.child, j.parent);
+  }
+  for (const Tendon &t : scene.tendons) {
+    const bool of_rod = std::any_of(t.points.begin(), t.points.end(), [](const Waypoint &p) { return p.rod >= 0; });
+    const std::vector<int> pulled = scene.bodiesOf(t);
+    for (const int b : pulled) {
+      joined[std::size_t(b)] = true;
+      if (of_rod) has_rod[std::size_t(b)] = true;
+      join(b, pulled.front());
+    }
+  }
+  for (std::size_t b = 0; b < count; ++b) {
+    const auto root = std::size_t(rootOf(int(b)));
+    has_rod[root] = has_rod[root] || has_rod[b];
+    joined[root] = joined[root] || joined[b];
+  }
+  const bool alone = scene.rods.empty();
+  std::vector<int> carrier(count, -1);
+  for (std::size_t b = 0; b < count; ++b) {
+    const auto root = std::size_t(rootOf(int(b)));
+    if (has_rod[root] || !(joined[root] || alone)) continue;
+    if (carrier[root] < 0) {
+      const Body &body = scene.bodies[root];
+      const double size = std::sqrt(body.own.inertia.trace() / body.own.mass);
+      Rod rod;
+      rod.name = "carrier of " + body.name;
+      rod.position = {body.position, body.position + Vec3(size, 0, 0)};
+      rod.material = {1e-9 * body.own.mass / size, 0, 1e4 * forceOf(scene, body, size), 0, {0, 0}, 0, 0};
+      rod.gravity = false;
+      rod.contact.on = false;
+      setBishopDirectors(rod);
+      carrier[root] = int(scene.rods.size());
+      for (const int v : {0, 1})
+        scene.supports.push_back({Support::Kind::pin, carrier[root], v, {}, frameAtVertex(rod, v)});
+      out.names.add(rod.name);
+      scene.rods.push_back(rod);
+      out.drawings.emplace_back();
+    }
+    scene.bodies[b].rod = carrier[root];
   }
 }
 

@@ -119,7 +119,8 @@ std::string boundsText(const Key &key) {
 /// What keys of one block ask of each other. The reader says the same, in words.
 std::string rulesOf(std::string_view block) {
   if (block.empty())
-    return R"("if": {"required": ["contact"]}, "then": {"anyOf": [{"required": ["colliders"]},
+    return R"("anyOf": [{"required": ["rods"]}, {"required": ["bodies"]}, {"required": ["include"]}],
+ "if": {"required": ["contact"]}, "then": {"anyOf": [{"required": ["colliders"]},
  {"properties": {"contact": {"required": ["rods"], "properties": {"rods": {"enum": ["others", "all"]}}}}},
  {"properties": {"rods": {"contains": {"required": ["contact"],
   "properties": {"contact": {"type": "object", "required": ["rods"], "properties": {"rods": {"enum": ["others", "all"]}}}}}}}}]})";
@@ -160,17 +161,16 @@ std::string rulesOf(std::string_view block) {
   {"required": ["fixed", "motion"], "properties": {"fixed": {"const": true}}}]}})";
   if (block == "supports[].motion" || block == "constraints[].motion" || block == "colliders[].motion" ||
       block == "bodies[].motion")
-    return R"("oneOf": [{"required": ["table"]}, {"anyOf": [{"required": ["velocity"]}, {"required": ["angular_velocity"]}]}])";
+    return R"("oneOf": [{"required": ["table"]}, {"anyOf": [{"required": ["velocity"]}, {"required": ["angular_velocity"]}, {"required": ["amplitude"]}]}],
+ "dependencies": {"amplitude": ["period"], "period": ["amplitude"]})";
   if (block == "tendons[].path[]")
     return R"("oneOf": [{"required": ["body"]}, {"required": ["rod"]}, {"required": ["joint"]}, {"required": ["cylinder"]}, {"required": ["sphere"]}],
  "dependencies": {"vertex": ["rod"], "edge": ["rod"], "offset": ["edge"], "coefficient": ["joint"], "axis": ["cylinder"], "side": ["cylinder"]},
  "not": {"required": ["vertex", "edge"]})";
   if (block == "tendons[]")
     return R"("not": {"anyOf": [{"required": ["displacement", "force"]}, {"required": ["displacement", "mckibben"]}, {"required": ["force", "mckibben"]}]})";
-  if (block == "tendons[].force")
-    return R"("oneOf": [{"required": ["tension"]}, {"required": ["table"]}])";
-  if (block == "tendons[].mckibben")
-    return R"("oneOf": [{"required": ["pressure"]}, {"required": ["table"]}])";
+  if (block == "tendons[].force") return R"("oneOf": [{"required": ["tension"]}, {"required": ["table"]}])";
+  if (block == "tendons[].mckibben") return R"("oneOf": [{"required": ["pressure"]}, {"required": ["table"]}])";
   if (block == "contact")
     return R"("if": {"required": ["radius"], "properties": {"radius": {"const": 0}}},
  "then": {"required": ["law"], "properties": {"law": {"const": "penalty"}}})";

@@ -35,11 +35,46 @@ std::string textOf(const Motion &m) {
     const std::string of_body = textOf(m.at(Vec3::Zero()));
     return of_body.empty() ? "" : of_body + ", of a body with the arm " + textOf(m.arm);
   }
+  const std::string swing =
+      m.amplitude.isZero(0) ? "" : ", amplitude " + textOf(m.amplitude) + " by " + textOf(m.period) + " s";
   if (m.table.empty())
-    return m.moves() ? ", velocity " + textOf(m.velocity) + ", angular velocity " + textOf(m.angular_velocity) : "";
+    return m.moves() ? ", velocity " + textOf(m.velocity) + ", angular velocity " + textOf(m.angular_velocity) + swing
+                     : "";
   std::string table;
   for (const Motion::Key &k : m.table) table += textOf(k.time) + textOf(k.displacement) + textOf(k.rotation);
   return ", motion by a table of " + std::to_string(m.table.size()) + " rows, #" + hashOf(table);
+}
+
+/// All but what its actuator is given.
+std::string textOf(const Tendon &t, const Scene &scene) {
+  const Actuator &a = t.actuator;
+  std::string text = std::string(nameOf(a.kind)) + ", stiffness " + textOf(a.stiffness) + ", damping " +
+                     textOf(a.damping) + (a.compression ? ", pushes" : "");
+  if (a.kind == Actuator::Kind::mckibben)
+    text += ", braid " + textOf(a.braid_length) + ", " + textOf(a.turns) + " turns, length " + textOf(a.muscle_length) +
+            ", above " + textOf(a.minimum_pressure) + " Pa";
+  for (const Tendon::Pull &p : t.joints)
+    text += ", " + textOf(p.coefficient) + " of joint '" + scene.joints[std::size_t(p.joint)].name + "'";
+  Digest path;
+  for (const Waypoint &p : t.points) {
+    path.add(&p.at, sizeof p.at);
+    path.add(textOf(p.motion));
+  }
+  for (const Wrap &w : t.wraps) {
+    const double what[] = {double(w.body), double(w.sphere), w.radius, double(w.side)};
+    path.add(what, sizeof what);
+    path.add(w.centre.data(), sizeof(Vec3));
+    path.add(w.axis.data(), sizeof(Vec3));
+  }
+  for (const Tendon::Segment &s : t.segments) path.add(&s, sizeof s);
+  return text + ", path #" + path.hex();
+}
+
+std::string inputOf(const Actuator &a) {
+  std::string table;
+  for (const Motion::Key &k : a.input_motion.table) table += textOf(k.time) + textOf(k.displacement[0]);
+  return table.empty() ? textOf(a.input)
+                       : "a table of " + std::to_string(a.input_motion.table.size()) + " rows, #" + hashOf(table);
 }
 
 std::string textOf(const Support &support) {
@@ -270,6 +305,12 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
     topology.add(j.point.data(), sizeof(Vec3));
     topology.add(j.axes.data(), sizeof(Mat3));
   }
+  for (const Tendon &t : scene.tendons)
+    for (const Waypoint &p : t.points) {
+      const int what[] = {int(&t - scene.tendons.data()), p.body, p.rod, p.edge};
+      topology.add(what, sizeof what);
+      topology.add(p.point.data(), sizeof(Vec3));
+    }
   topology_hash = topology.hex();
   std::sort(names.begin(), names.end());
   for (const std::string &name : names) set.add(name + "\n");
@@ -293,6 +334,11 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
   for (const Joint &j : scene.joints) {
     holders.add(j.name);
     add(Kind::scene, "joint '" + j.name + "'", textOf(j));
+  }
+  for (const Tendon &t : scene.tendons) {
+    holders.add(t.name);
+    add(Kind::scene, "tendon '" + t.name + "'", textOf(t, scene));
+    add(Kind::load, "input of tendon '" + t.name + "'", inputOf(t.actuator));
   }
   add(Kind::scene, order_of_holders, "#" + holders.hex());
   for (const Collider &c : scene.colliders) add(Kind::scene, "collider '" + c.name + "'", textOf(c));

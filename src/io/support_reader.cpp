@@ -49,10 +49,17 @@ Motion readMotion(const YamlValue &value, const MotionKeys &keys) {
   Motion m;
   m.velocity = map.vector(keys.velocity);
   m.angular_velocity = map.vector(keys.angular_velocity);
-  const bool steady = map.has(*keys.velocity) || map.has(*keys.angular_velocity), table = map.has(*keys.table);
-  if (!steady && !table) value.fail("'motion' needs 'velocity' and/or 'angular_velocity', or a 'table'");
+  m.amplitude = map.vector(keys.amplitude);
+  const bool swings = map.has(*keys.amplitude), table = map.has(*keys.table),
+             steady = map.has(*keys.velocity) || map.has(*keys.angular_velocity) || swings;
+  if (swings != map.has(*keys.period))
+    value.fail(std::string("'amplitude' and 'period' belong together, and '") + (swings ? "period" : "amplitude") +
+               "' is missing");
+  if (swings) m.period = map.number(keys.period);
+  if (!steady && !table)
+    value.fail("'motion' needs 'velocity', 'angular_velocity' and/or an 'amplitude' with its 'period', or a 'table'");
   if (table) {
-    if (steady) value.fail("'motion' takes a 'table' or velocities, not both");
+    if (steady) value.fail("'motion' takes a 'table', or velocities and an amplitude, not both");
     for (const YamlValue &row : map.at(*keys.table).items()) {
       const std::size_t n = row.node().size();
       if (n != 4 && n != 7) row.fail("a row of 'table' is [time, dx, dy, dz] or [time, dx, dy, dz, rx, ry, rz]");
@@ -76,13 +83,14 @@ void refuseTurning(const YamlValue &motion, const Motion &m, const std::string &
 void refuseTravel(const YamlValue &motion, const Motion &m, const std::string &advice) {
   const bool moves =
       std::any_of(m.table.begin(), m.table.end(), [](const auto &k) { return !k.displacement.isZero(0); });
-  if (moves || !m.velocity.isZero(0)) motion.fail(advice);
+  if (moves || !m.velocity.isZero(0) || !m.amplitude.isZero(0)) motion.fail(advice);
 }
 
 namespace {
 
-constexpr MotionKeys support_motion_keys{"supports[].motion", "supports[].motion.velocity",
-                                 "supports[].motion.angular_velocity", "supports[].motion.table"};
+constexpr MotionKeys support_motion_keys{
+    "supports[].motion",           "supports[].motion.velocity", "supports[].motion.angular_velocity",
+    "supports[].motion.amplitude", "supports[].motion.period",   "supports[].motion.table"};
 
 /// A motion that is elsewhere at the start than the rod as drawn.
 std::string jumpOf(const Motion &motion, const std::string &rod) {

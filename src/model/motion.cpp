@@ -32,12 +32,14 @@ Vec3 slope(const std::vector<Motion::Key> &table, double time, Vec3 Motion::Key:
 } // namespace
 
 Vec3 Motion::displacementAt(double time) const {
-  const Vec3 moved = table.empty() ? Vec3(velocity * time) : interpolate(table, time, &Key::displacement);
+  Vec3 moved = table.empty() ? Vec3(velocity * time) : interpolate(table, time, &Key::displacement);
+  if (!amplitude.isZero(0)) moved += 0.5 * (1 - std::cos(2 * pi * time / period)) * amplitude;
   return arm.isZero(0) ? moved : Vec3(moved + rotationAt(time) * arm - arm);
 }
 
 Vec3 Motion::velocityAt(double time) const {
-  const Vec3 moving = table.empty() ? velocity : slope(table, time, &Key::displacement);
+  Vec3 moving = table.empty() ? velocity : slope(table, time, &Key::displacement);
+  if (!amplitude.isZero(0)) moving += pi / period * std::sin(2 * pi * time / period) * amplitude;
   return arm.isZero(0) ? moving : Vec3(moving + angularVelocityAt(time).cross(rotationAt(time) * arm));
 }
 
@@ -67,7 +69,8 @@ double Motion::evenUntil(double from, double to) const {
   constexpr double turn = 0.5;
   const auto row =
       std::upper_bound(table.begin(), table.end(), from, [](double t, const Motion::Key &k) { return t < k.time; });
-  const double next = row == table.end() ? to : std::min(to, row->time),
+  const double part = amplitude.isZero(0) ? HUGE_VAL : from + period / 32,
+               next = std::min(part, row == table.end() ? to : std::min(to, row->time)),
                turned = (rotationVectorAt(next) - rotationVectorAt(from)).norm();
   return turned > turn ? from + (next - from) * turn / turned : next;
 }

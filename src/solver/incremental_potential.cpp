@@ -11,7 +11,7 @@ namespace tendril {
 using C = Configuration;
 
 IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, const Elements &elements, bool dynamic)
-    : scene_(scene), dofs_(dofs), elements_(elements), retraction_(elements), axial_(scene, elements),
+    : scene_(scene), dofs_(dofs), elements_(elements), retraction_(elements), linkage_(scene, elements), axial_(scene, elements),
       terms_(makeTerms(scene, elements, axial_, dynamic)), supports_(scene, dofs, elements), start_(elements.slots),
       known_(elements.rods.size(), Known::nothing), scales_(rodScales(scene, elements)), dynamic_(dynamic),
       couples_positions_(

@@ -36,7 +36,12 @@ bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r,
     trial.setObstacleTime(r, part == 1 ? next : now + part * (next - now));
   }
   if (dofs_.isCoupled(dofs_.islandOf(r))) kind = RetractionKind::additive;
-  if (!retraction_.apply(iterate_, increment, scale, r, kind, trial)) return false;
+  const bool linked = linkage_.moves(r);
+  if (linked) {
+    linkage_.correct(iterate_, increment, scale, r, linked_);
+    dofs_.copyBehindRing(elements_.rods[r], linked_);
+  }
+  if (!retraction_.apply(iterate_, linked ? linked_ : increment, linked ? 1 : scale, r, kind, trial)) return false;
   setTrialForces(increment, scale, r, kind, trial);
   const double fraction = freeFraction(iterate_, trial, r);
   if (free) *free = fraction;

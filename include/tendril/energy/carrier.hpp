@@ -21,6 +21,10 @@ struct Carrier {
   int body() const { return -1 - edge; }
   /// Of how many variables it is.
   int count() const { return isBody() ? 6 : variables; }
+  /// Slot and component of a variable.
+  std::pair<int, int> place(int variable) const {
+    return variable == 6 ? std::pair(slot[0], 3) : std::pair(slot[std::size_t(variable / 3)], variable % 3);
+  }
   bool operator==(const Carrier &) const = default;
 
   static Carrier ofBody(const JoinedBody &body) {

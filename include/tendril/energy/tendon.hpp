@@ -28,6 +28,9 @@ double storedBy(const Actuator &actuator, double displacement, double input);
 /// Work on what is pulled between two displacements at an input that is given, without its damper; 0 of a spring [J].
 double workBetween(const Actuator &actuator, double from, double to, double input);
 
+/// How stiff an actuator is at most near what is drawn, whatever its input [N/m].
+double stiffnessAsDrawn(const Tendon &tendon);
+
 /// Where a point of a tendon is as drawn [m].
 Vec3 asDrawn(const Scene &scene, const Waypoint &point);
 /// Length of a segment as drawn [m].

@@ -12,4 +12,8 @@ void place(Scene &scene, std::vector<Drawing> &drawings, const Mat3 &rotation, c
 /// \param where for messages \throws SceneError where both have the same name
 void append(SceneFile part, const std::string &prefix, const YamlValue &where, SceneFile &out);
 
+/// Adds rods for bodies that joints and tendons join, but no rod, and where there are no rods at all for every other:
+/// bodies are solved with rods. Each is one edge without weight, which is held.
+void carryBodies(SceneFile &out);
+
 } // namespace tendril

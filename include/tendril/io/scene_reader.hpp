@@ -48,6 +48,7 @@ struct SceneFile {
   /// Constraints that tie vertices to bodies, by rod and vertex.
   std::map<std::pair<int, int>, std::string> attached;
   std::vector<Drawing> drawings; ///< per rod
+  int ignored_pairs = 0;         ///< of rods and bodies that pass through each other by `ignore`
   RunSettings run;
   std::vector<std::string> notes; ///< to be told at the start: defaults of materials, and warnings
 };

@@ -23,7 +23,8 @@ std::vector<int> readTargets(YamlMap &map, KeyOf<KeyType::rod> key, const RodNam
 int readIndex(YamlMap &map, KeyOf<KeyType::index> key, int count, const std::string &rod);
 struct MotionKeys {
   KeyOf<KeyType::map, KeyType::list, KeyType::word_or_map> motion;
-  KeyOf<KeyType::vector> velocity, angular_velocity;
+  KeyOf<KeyType::vector> velocity, angular_velocity, amplitude;
+  KeyOf<KeyType::number> period;
   KeyOf<KeyType::rows> table;
 };
 Motion readMotion(const YamlValue &value, const MotionKeys &keys);

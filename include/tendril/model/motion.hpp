@@ -8,8 +8,8 @@
 
 namespace tendril {
 
-/// How a held thing moves: displacement and rotation vector, both from the reference, by constant velocities or by a
-/// table, linear between its rows and at rest before the first and after the last.
+/// How a held thing moves: displacement and rotation vector, both from the reference, by constant velocities and a
+/// swing, or by a table, linear between its rows and at rest before the first and after the last.
 struct Motion {
   struct Key {
     double time;       ///< [s]
@@ -19,12 +19,17 @@ struct Motion {
   };
   Vec3 velocity = Vec3::Zero();         ///< [m/s]
   Vec3 angular_velocity = Vec3::Zero(); ///< about the vertex [rad/s]
-  std::vector<Key> table;               ///< in order of time; used instead of the velocities when not empty
+  /// Out and back in a period: displacement amplitude (1 - cos(2 pi t/period))/2 [m], [s].
+  Vec3 amplitude = Vec3::Zero();
+  double period = 1;
+  std::vector<Key> table; ///< in order of time; used instead of the velocities when not empty
   Vec3 arm =
       Vec3::Zero(); ///< from the point that is moved so and turned about, to the thing: it goes round with it [m]
 
   bool operator==(const Motion &) const = default;
-  bool moves() const { return !table.empty() || !velocity.isZero(0) || !angular_velocity.isZero(0); }
+  bool moves() const {
+    return !table.empty() || !velocity.isZero(0) || !angular_velocity.isZero(0) || !amplitude.isZero(0);
+  }
   Vec3 displacementAt(double time) const; ///< of the thing
   /// Of the same motion a point elsewhere.
   Motion at(const Vec3 &arm_there) const {

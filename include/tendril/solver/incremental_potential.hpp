@@ -4,6 +4,7 @@
 /// the moves between iterates. Rods that nothing joins are independent of each other: everything is done rod by rod.
 
 #include "tendril/coupling/couplings.hpp"
+#include "tendril/energy/linkage.hpp"
 #include "tendril/energy/work.hpp"
 #include "tendril/layout/team.hpp"
 #include "tendril/solver/residual.hpp"
@@ -259,6 +260,8 @@ private:
   DofMap &dofs_;
   const Elements &elements_;
   Retraction retraction_;
+  Linkage linkage_;
+  Planes linked_; ///< increments of one rod, as the linkage corrects them
   AxialLaw axial_;
   std::vector<std::unique_ptr<Term>> terms_;
   Step step_;
