@@ -21,7 +21,8 @@ import numpy as np
 
 FORMATS = (1, 2)
 PLACES = ("vertices", "edges", "cells")
-ROWS = ("supports", "constraints", "colliders", "bodies", "attachments", "joints")  # of fields that are not of rods
+ROWS = ("supports", "constraints", "colliders", "bodies", "attachments", "joints", "tendons",
+        "tendon_points")  # of fields that are not of rods
 ON_DEMAND = ("curvature", "twist", "strain_energy_density", "force", "moment", "reaction", "reaction_moment",
              "constraint_deviation", "constraint_force", "contact_force", "collider_force", "collider_moment",
              "attachment_force", "attachment_moment", "joint_coordinate", "joint_distance", "joint_force",
@@ -104,8 +105,8 @@ def _open(path):
 
 
 class Field:
-    """A field of all rods, at `place`: vertices, edges, cells, supports, constraints, colliders, bodies, attachments or joints; indices read
-    from the file what they ask for.
+    """A field of all rods, at `place`: vertices, edges, cells, supports, constraints, colliders, bodies, attachments,
+    joints, tendons or tendon_points; indices read from the file what they ask for.
 
     field[frame], field[first:last, vertex], numpy.asarray(field). Shape: (frames, n), or (frames, n, components).
     """
@@ -205,8 +206,9 @@ class Rod:
 
     def _slice(self, place):
         if place in ROWS:
-            raise TendrilError(f"a field of {place} is not one of rods: trajectory.field(name)[frame] has a row for each "
-                               f"of trajectory.{place}")
+            owners = "point of trajectory.tendons" if place == "tendon_points" else f"of trajectory.{place}"
+            raise TendrilError(f"a field of {place} is not one of rods: trajectory.field(name)[frame] has a row for "
+                               f"each {owners}")
         if place not in self._slices:
             raise TendrilError(f"files of format 1 do not tell which {place} are those of rod '{self.name}'")
         return self._slices[place]
@@ -355,7 +357,7 @@ class Joint:
 
 
 class Things(list):
-    """Bodies or colliders by number or name."""
+    """Bodies, colliders or tendons by number or name."""
 
     names = property(lambda self: [thing.name for thing in self])
 
@@ -427,13 +429,61 @@ class Thing:
         return f"<{self._kind} '{self.name}', {self.shape}>"
 
 
+class Tendon:
+    """A cord through points, or a sum of joints' coordinates, or both. Frames are numbers (-1 is the last) or slices.
+
+    name; actuator: displacement, force, mckibben or none; points: how many, with those of the arcs where it winds round
+    something, 0 of a sum of joints alone; segments (m, 2): numbers of points with straight lines between.
+    """
+
+    def __init__(self, trajectory, index):
+        self._t, self.index = trajectory, index
+        data = trajectory._file["tendons"]
+        self.name, self.actuator = (_text(data[key][index]) for key in ("name", "actuator"))
+        first, end = data["first_point"][index : index + 2].tolist()
+        self._points, self.points = slice(first, end), end - first
+        pairs = data["segments"][:] if "segments" in data else np.zeros((0, 2), int)
+        self.segments = pairs[(pairs[:, 0] >= first) & (pairs[:, 0] < end)] - first
+
+    def field(self, name, frame=-1):
+        """Value of a field of tendons, or values (points, 3) of one of their points; with a slice of frames, these come
+        first."""
+        field = self._t.field(name)
+        return field[frame, self._points if field.place == "tendon_points" else self.index]
+
+    def displacement(self, frame=-1):
+        """Change of its length since it was drawn, with the sum of joints [m]."""
+        return self.field("tendon_displacement", frame)
+
+    def length(self, frame=-1):
+        """Of its straight parts and arcs, 0 of a sum of joints alone [m]."""
+        return self.field("tendon_length", frame)
+
+    def rate(self, frame=-1):
+        """Of the displacement [m/s]."""
+        return self.field("tendon_rate", frame)
+
+    def tension(self, frame=-1):
+        """[N]."""
+        return self.field("tendon_tension", frame)
+
+    def position(self, frame=-1):
+        """Of its points, (points, 3) [m]."""
+        if not self.points:  # a file may have none at all
+            return np.zeros((*np.shape(self._t.time[frame]), 0, 3))
+        return self.field("tendon_position", frame)
+
+    def __repr__(self):
+        return f"<tendon '{self.name}', {self.actuator}, {self.points} points>"
+
+
 def _unit_vectors(v, instead):
     size = np.linalg.norm(v, axis=-1, keepdims=True)
     return np.where(size > 0, v / np.where(size > 0, size, 1), instead)
 
 
 class Moment:
-    """The state at a time between frames: `time`, `rods`, `bodies`, `colliders`, `field(name)` of all rods.
+    """The state at a time between frames: `time`, `rods`, `bodies`, `colliders`, `tendons`, `field(name)` of all rods.
 
     Linear between the two frames; directors and rotations are normalised, whole turns are those of the frame before.
     """
@@ -462,6 +512,14 @@ class Moment:
 
     bodies = property(lambda self: self._things(self._t.bodies))
     colliders = property(lambda self: self._things(self._t.colliders))
+
+    @property
+    def tendons(self):
+        tendons = self._t.tendons
+        for tendon in tendons:
+            tendon.field = lambda name, frame=None, tendon=tendon: self._between(
+                lambda k: Tendon.field(tendon, name, k), name)
+        return tendons
 
     def field(self, name):
         """(n,) or (n, components)."""
@@ -508,9 +566,9 @@ class Trajectory:
     """A trajectory.h5, given by its path or that of its folder.
 
     path, format_version, attributes (those of the file: command line, version, ...), gravity (3,) [m/s^2];
-    rods, supports, constraints, bodies, attachments, joints, colliders; scene: its text, or None; scene_files: texts that it
-    names, by path as written; options: Options. A frame counts once it is complete. What a run has added since is seen
-    after refresh().
+    rods, supports, constraints, bodies, attachments, joints, tendons, colliders; scene: its text, or None; scene_files:
+    texts that it names, by path as written; options: Options. A frame counts once it is complete. What a run has added
+    since is seen after refresh().
     """
 
     def __init__(self, path):
@@ -609,6 +667,11 @@ class Trajectory:
     rods = property(lambda self: Rods(self))
     bodies = property(lambda self: self._things("bodies"))
     colliders = property(lambda self: self._things("colliders"))
+
+    @property
+    def tendons(self):
+        count = len(self._file["tendons/name"]) if "tendons" in self._file else 0
+        return Things(Tendon(self, k) for k in range(count))
 
     def _things(self, group):
         count = len(self._file[group]["shape"]) if group in self._file else 0
@@ -741,7 +804,9 @@ class Trajectory:
         except ImportError:
             raise TendrilError("to_xarray needs xarray: apt-get install python3-xarray") from None
         dimension = {"vertices": "vertex", "edges": "edge", "cells": "cell", "supports": "support",
-                     "constraints": "constraint", "colliders": "collider", "bodies": "body", "attachments": "attachment", "joints": "joint"}
+                     "constraints": "constraint", "colliders": "collider", "bodies": "body",
+                     "attachments": "attachment", "joints": "joint", "tendons": "tendon",
+                     "tendon_points": "tendon_point"}
         variables = {}
         for name in self._fields:
             field = self.field(name)
@@ -754,6 +819,8 @@ class Trajectory:
             coordinates[dimension[place] + "_rod"] = dimension[place], rods
         if len(self.bodies):
             coordinates["body"] = self.bodies.names
+        if len(self.tendons):
+            coordinates["tendon"] = self.tendons.names
         return xarray.Dataset(variables, coordinates, self.attributes)
 
     def __repr__(self):

@@ -123,6 +123,19 @@ def tube(x, director, half_axes, colour, closed=False, group=0):
     return Shapes(capsules=Capsules(*(v[keep] for v in vars(c).values())))
 
 
+def cords(x, segments, radius, colour, group=0):
+    """A tendon: straight lines with round ends between pairs (m, 2) of the points x (n, 3) [m], colour (3,).
+
+    Lines that are not finite are left out.
+    """
+    a, b = x[segments[:, 0]], x[segments[:, 1]]
+    keep = np.isfinite(a).all(1) & np.isfinite(b).all(1)
+    a, b = a[keep], b[keep]
+    n = len(a)
+    return Shapes(Capsules(a, b, perpendicular(unit(b - a), np.full((n, 3), np.nan)), np.full((n, 2), float(radius)),
+                           np.zeros((n, 2), bool), np.broadcast_to(colour, (n, 2, 3)), np.full(n, group)))
+
+
 RECTANGLE = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]), np.array([[0, 1], [-1, 0], [0, -1], [1, 0]])
 
 

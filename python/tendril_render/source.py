@@ -2,10 +2,11 @@
 import numpy as np
 from tendril import ON_DEMAND, Trajectory, surface_normals
 
-from .shapes import RECTANGLE, Shapes, Triangles, bar, body, ellipse, join, smoothed, tube
+from .shapes import RECTANGLE, Shapes, Triangles, bar, body, cords, ellipse, join, smoothed, tube
 from .skins import along, creased
 
 OF_OUR_OWN = ("time", "rod")  # values that every trajectory has
+THIN = 0.003  # radius of tendons, as a share of the size of all
 
 
 class Mistake(Exception):
@@ -81,6 +82,8 @@ def is_static(t):
     """Whether nothing moves: the times of frames are then load factors, which may fall as well as rise."""
     if "velocity" not in t.field_names or len(t.time) < 2:
         return False
+    if "body_velocity" in t.field_names and np.any(t.field("body_velocity")[len(t.time) - 1]):
+        return False
     return not any(np.any(r.field("velocity", len(t.time) - 1)) for r in t.rods)
 
 
@@ -94,6 +97,8 @@ class Source:
             raise Mistake(f"field {field}: this trajectory has {', '.join(fields(t))}{hint}")
         self.t, self.field, self.theme, self.radius, self.smooth = t, field, theme, radius, smooth
         self.rods = range(len(t.rods))[rods]
+        seen = [k for k in self.rods if not t.rods[k].name.startswith("carrier of ")]  # those stand for no thing
+        self.rods = seen or self.rods
         if not self.rods:
             raise Mistake(f"none of the {len(t.rods)} rods is chosen")
         # Skins by rod: the skin, the points that are split where it is sharp, and the triangles of these.
@@ -102,6 +107,9 @@ class Source:
         self.offset = np.asarray(offset, float)  # from one frame of a picture to the next [m]
         self.left_out = 0  # edges that are not finite
         self.clipped = False  # whether there are values above the scale
+        self.tendons = t.tendons if "tendon_position" in t.field_names else []
+        self.tendon_radius = 0
+        self.tendon_radius = THIN * np.linalg.norm(np.ptp(self.points(frames[0])[0], axis=0)) if self.tendons else 0
         self.colours, self.range = None, None
         if field is not None:
             self.range = self.values_range(frames)
@@ -136,7 +144,7 @@ class Source:
         return axes if np.isfinite(axes).all() else np.full(2, np.nan_to_num(rod.radius))
 
     def clouds(self, frames):
-        """Points (n, 3) along all rods and on their skins [m], an array for each frame of a picture."""
+        """Points (n, 3) along all rods and tendons and on skins [m], an array for each frame of a picture."""
         def between(x, closed):
             x = np.concatenate([x, x[:1]]) if closed else x
             s = np.arange(8)[:, None, None] / 8
@@ -144,7 +152,8 @@ class Source:
 
         rods = [self.t.rods[k] for k in self.rods]
         return [np.concatenate([between(r.position(f), r.closed) for r in rods]
-                               + [skin.vertices(f) for skin, _, _ in self.skins.values()]) + j * self.offset
+                               + [skin.vertices(f) for skin, _, _ in self.skins.values()]
+                               + [tendon.position(f) for tendon in self.tendons]) + j * self.offset
                 for j, f in enumerate(frames)]
 
     def rod(self, index, frame, place, pixel):
@@ -186,6 +195,7 @@ class Source:
         for j, f in enumerate(frames):
             parts += [self.thing(b, f, self.theme.body, j) for b in self.t.bodies]
             parts += [self.thing(c, f, self.theme.collider, j) for c in self.t.colliders]
+            parts += [self.tendon(k, f, j) for k in range(len(self.tendons))]
         return join(parts)
 
     def thing(self, thing, frame, colour, place=0):
@@ -194,9 +204,16 @@ class Source:
         return body(thing.shape, thing.parameters, position + place * self.offset, quaternion,
                     np.asarray(colour) ** 2.2, thing.vertices, thing.triangles)
 
+    def tendon(self, index, frame, place=0):
+        """Shapes of a tendon."""
+        tendon = self.tendons[index]
+        return cords(tendon.position(frame) + place * self.offset, tendon.segments, self.tendon_radius,
+                     np.asarray(self.theme.tendon) ** 2.2, -2 - index)
+
     def points(self, frame, place=0):
-        """Centres (n, 3) and radii (n,) [m] of balls that hold the rods and bodies; colliders may be endless."""
+        """Centres (n, 3) and radii (n,) [m] of balls that hold rods, bodies and tendons; colliders may be endless."""
         parts = [self.thing(b, frame, (0, 0, 0), place).points() for b in self.t.bodies]
+        parts += [self.tendon(k, frame, place).points() for k in range(len(self.tendons))]
         for k in self.rods:
             rod, skinned = self.t.rods[k], k in self.skins
             x = (self.skins[k][0].vertices(frame) if skinned else rod.position(frame)) + place * self.offset
@@ -205,7 +222,7 @@ class Source:
         return tuple(np.concatenate(v) for v in zip(*parts))
 
     def bounds(self, frames, places=None):
-        """Lower and upper corner [m] of all rods and bodies in some frames, and of colliders close to them."""
+        """Lower and upper corner [m] of all that points() holds in some frames, and of colliders close to them."""
         lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
         for f, place in zip(frames, places or [0] * len(frames)):
             x, r = self.points(f, place)

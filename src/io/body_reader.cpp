@@ -332,7 +332,7 @@ void readBody(const YamlValue &value, const ContactSettings &contact, SceneFile 
   }
   for (const AnyKey key : {AnyKey("bodies[].velocity"), AnyKey("bodies[].angular_velocity"), AnyKey("bodies[].force"),
                            AnyKey("bodies[].torque"), AnyKey("bodies[].contact")})
-    if (held && map.has(key))
+    if (held && map.has(key) && !(key->name() == "contact" && !body.contact.on))
       map.at(key).fail("'" + std::string(key->name()) +
                        "' has no meaning for a body that is 'fixed' or goes by its "
                        "'motion'; take it away");

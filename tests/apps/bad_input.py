@@ -82,6 +82,12 @@ files = {
     "mumps.yaml": b"mat_mumps_icntl_24: 1\n",
     "plain.txt": b"# PETSc's older format\n-t_end 0.02\n-dt fast\n",
     "plain": b"dt: 1e-3\n",
+    "itself.yaml": b"include: [{file: itself.yaml}]\n",
+    "there.yaml": b"include: [{file: scene.yaml}]\n",
+    "turning.yaml": base.encode() + b"rotation: {angular_velocity: [0, 0, 1]}\n",
+    "misspelt.yaml": b"rods:\n  - {nam: b, line: {from: [0, 0, 0], to: [1, 0, 0], edges: 4}, material: default}\n",
+    "same.yaml": b"rods: [{name: a, line: {from: [0, 0, 1], to: [1, 0, 1], edges: 4}, material: default}]\n",
+    "weight.yaml": b"bodies: [{name: weight, sphere: {radius: 0.1}, density: 1000, position: [5, 0, 0]}]\n",
 }
 
 
@@ -125,6 +131,23 @@ def joints(text):
     return bodies(f"{cube}, {wall}", "", f"\njoints: [{text}]")
 
 
+def tendon(path, keys="", more=""):
+    """A tendon in line 12 over a body that hangs in a hinge and one that has a ball, beside the rod."""
+    ties = "{name: elbow, type: hinge, child: cube, point: [0, 1, 0]}, {name: hip, type: ball, child: bob, point: [3, 1, 0]}"
+    bob = "{name: bob, sphere: {radius: 0.1}, density: 1000, position: [3, 0, 0]}"
+    return bodies(f"{cube}, {bob}", "", f"\njoints: [{ties}]\ntendons: [{{name: t, path: [{path}]{keys}}}{more}]")
+
+
+def pulled(keys):
+    """A tendon from the world to a body, with what pulls on it."""
+    return tendon(nail + ", {body: cube}", ", " + keys)
+
+
+def include(text, more=""):
+    """Scenes in line 9 that this one includes."""
+    return (support, f"{support}\ninclude: [{text}]{more}")
+
+
 def skin(text, more="", kind="radius: 0.01"):
     """The rod with a skin, in a material whose section is of another kind; the skin is in line 7."""
     return ("radius: 0.01, young: 1e7, poisson: 0.3, density: 1000}\n" + "supports:\n" + support,
@@ -138,6 +161,7 @@ def surface(text="{tube: {sides: 8}}", keys="", more=""):
 
 
 cube = "{name: cube, box: {size: [0.2, 0.2, 0.2]}, density: 1000}"
+nail = "{body: world, point: [2, 0.5, 0]}"
 
 
 def motion(text, kind="clamp"):
@@ -348,6 +372,92 @@ rows = [
     ("motor that jumps", joints("{name: elbow, type: hinge, child: cube, drive: {target: 0.5}}"), [], ["joint 'elbow'", "begins at 0.5", "give the drive a 'stiffness'"]),
     ("range of a ball that is none", joints("{type: ball, child: cube, range: [0, 1e-6]}"), [], ["scene.yaml:11", "0.01 rad or more"]),
     ("joint that tears at once", bodies("{name: bar, sphere: {radius: 0.1}, density: 1, position: [1, 1, 1], angular_velocity: [0, 0, 5]}", "", "\njoints: [{name: hip, type: hinge, child: bar, point: [0, 1, 1]}]"), [], ["joint 'hip'", "'bar' moves away from it by 5 m/s", "'velocity'"]),
+    # tendons
+    ("tendon without a path", bodies(cube, "", "\ntendons: [{name: t}]"), [], ["scene.yaml:11", "needs the key 'path'"]),
+    ("tendon along nothing", tendon(""), [], ["scene.yaml:12", "'path' is empty"]),
+    ("misspelt key of a tendon", tendon(nail + ", {body: cube}", ", forse: {tension: 1}"), [], ["scene.yaml:12", "unknown key 'forse'", "did you mean 'force'"]),
+    ("misspelt key of a path", tendon(nail + ", {bdy: cube}"), [], ["scene.yaml:12", "'bdy'", "did you mean 'body'"]),
+    ("tendon to an unknown body", tendon(nail + ", {body: cub}"), [], ["scene.yaml:12", "no body 'cub'", "did you mean 'cube'"]),
+    ("tendon over an unknown joint", tendon("{joint: elbw}"), [], ["scene.yaml:12", "no joint 'elbw'", "did you mean 'elbow'"]),
+    ("tendon to an unknown rod", tendon(nail + ", {rod: b, vertex: 4}"), [], ["scene.yaml:12", "no rod 'b'"]),
+    ("tendon round an unknown body", tendon(nail + ", {cylinder: cub, radius: 0.1}, {body: bob}"), [], ["scene.yaml:12", "no body 'cub'"]),
+    ("tendon to no vertex of a rod", tendon(nail + ", {rod: a}"), [], ["scene.yaml:12", "'vertex'", "'edge'"]),
+    ("tendon to a vertex and an edge", tendon(nail + ", {rod: a, vertex: 4, edge: 3}"), [], ["scene.yaml:12", "one of both"]),
+    ("tendon to a vertex out of range", tendon(nail + ", {rod: a, vertex: 5}"), [], ["scene.yaml:12", "out of range", "0 to 4"]),
+    ("tendon beside a vertex", tendon(nail + ", {rod: a, vertex: 4, offset: [0.1, 0]}"), [], ["scene.yaml:12", "'offset' is for a point beside an 'edge'"]),
+    ("tendon beside a cable", ("density: 1000}\n" + "supports:\n" + support, "density: 1000, flexural_stiffness: 0}\ntendons:\n  - path: [{rod: a, edge: 3, offset: [0.1, 0]}, "
+     "{body: world, point: [2, 0, 0]}]"), [], ["scene.yaml:8", "rod 'a' has no flexural stiffness", "no frames"]),
+    ("entry of two kinds", tendon(nail + ", {body: cube, rod: a, vertex: 4}"), [], ["scene.yaml:12", "one of 'body', 'rod', 'joint', 'cylinder' and 'sphere'", "found 2"]),
+    ("entry of no kind", tendon(nail + ", {point: [0, 0, 0]}"), [], ["scene.yaml:12", "found 0"]),
+    ("point of the world without a place", tendon("{body: world}, {body: cube}"), [], ["scene.yaml:12", "needs its 'point'"]),
+    ("point of a rod by its place", tendon(nail + ", {rod: a, vertex: 4, point: [1, 0, 0]}"), [], ["scene.yaml:12", "'point' is for a body, cylinder or sphere"]),
+    ("vertex of a body", tendon(nail + ", {body: cube, vertex: 4}"), [], ["scene.yaml:12", "'vertex' is for a rod"]),
+    ("coefficient of a body", tendon(nail + ", {body: cube, coefficient: 2}"), [], ["scene.yaml:12", "'coefficient' is for a joint"]),
+    ("radius of a point", tendon(nail + ", {body: cube, radius: 1}"), [], ["scene.yaml:12", "'radius' is for a cylinder or sphere"]),
+    ("point by itself", tendon("{body: cube}, {joint: elbow}"), [], ["scene.yaml:12", "entry 0 of the path is a point by itself"]),
+    ("one point", tendon("{body: cube}"), [], ["scene.yaml:12", "a point by itself"]),
+    ("winding at the end of a path", tendon(nail + ", {body: bob}, {cylinder: cube, radius: 0.1}"), [], ["scene.yaml:12", "entry 2", "must stand between two points"]),
+    ("winding round two in a row", tendon(nail + ", {cylinder: cube, radius: 0.1}, {sphere: bob}, {body: bob}"), [], ["scene.yaml:12", "must stand between two points"]),
+    ("winding round no radius", tendon(nail + ", {cylinder: cube}, {body: bob}"), [], ["scene.yaml:12", "needs a 'radius'", "body 'cube' is no cylinder"]),
+    ("winding round a negative radius", tendon(nail + ", {sphere: cube, radius: -1}, {body: bob}"), [], ["scene.yaml:12", "'radius' must be greater than zero"]),
+    ("winding from within", tendon(nail + ", {sphere: cube, radius: 2.5}, {body: bob}"), [], ["scene.yaml:12", "(2, 0.5, 0) m lies within the sphere of radius 2.5 m", "smaller 'radius'"]),
+    ("winding about nothing", tendon(nail + ", {cylinder: cube, radius: 0.1, axis: [0, 0, 0]}, {body: bob}"), [], ["scene.yaml:12", "'axis' must not be zero"]),
+    ("side of a sphere", tendon(nail + ", {sphere: cube, radius: 0.1, side: 1}, {body: bob}"), [], ["scene.yaml:12", "'side' is for a cylinder"]),
+    ("side that is none", tendon(nail + ", {cylinder: cube, radius: 0.1, side: 2}, {body: bob}"), [], ["scene.yaml:12", "'side' must lie in [-1, 1]"]),
+    ("winding round the world nowhere", tendon(nail + ", {cylinder: world, radius: 0.1}, {body: bob}"), [], ["scene.yaml:12", "in the world it needs a 'point'"]),
+    ("points at one place", tendon("{body: world, point: [0, 0, 0]}, {body: cube}"), [], ["scene.yaml:12", "points 0 and 1", "at one place", "take one of them away"]),
+    ("tendon over a ball", tendon("{joint: hip}"), [], ["scene.yaml:12", "joint 'hip' is of 'type: ball'", "hinge, prismatic, cylindrical or planar"]),
+    ("coefficient of zero", tendon("{joint: elbow, coefficient: 0}"), [], ["scene.yaml:12", "'coefficient' must not be 0"]),
+    ("tendon that moves nothing", tendon(nail + ", {body: world, point: [0, 0, 0]}"), [], ["scene.yaml:12", "nothing that it runs through can move"]),
+    ("tendons named twice", tendon(nail + ", {body: cube}", "", ", {name: t, path: [{joint: elbow}]}"), [], ["scene.yaml:12", "name 't' is there already"]),
+    ("two actuators", pulled("force: {tension: 1}, displacement: {stiffness: 1}"), [], ["scene.yaml:12", "one actuator", "two tendons"]),
+    ("tension of no size", pulled("force: {}"), [], ["scene.yaml:12", "needs a 'tension' or a 'table'"]),
+    ("negative tension", pulled("force: {tension: -1}"), [], ["scene.yaml:12", "'tension' must not be negative"]),
+    ("negative tension in a table", pulled("force: {table: [[0, 1], [1, -1]]}"), [], ["scene.yaml:12", "tension must not be negative, found -1"]),
+    ("tension twice", pulled("force: {tension: 1, table: [[0, 1]]}"), [], ["scene.yaml:12", "'tension' or a 'table', not both"]),
+    ("tension that is not finite", pulled("force: {tension: .nan}"), [], ["scene.yaml:12", "finite"]),
+    ("displacement without a stiffness", pulled("displacement: {target: 1}"), [], ["scene.yaml:12", "needs the key 'stiffness'"]),
+    ("displacement of nothing", pulled("displacement: {stiffness: 0}"), [], ["scene.yaml:12", "nothing is pulled"]),
+    ("two targets", pulled("displacement: {stiffness: 1, target: 1, table: [[0, 0]]}"), [], ["scene.yaml:12", "'target' or a 'table', not both"]),
+    ("targets back in time", pulled("displacement: {stiffness: 1, table: [[1, 0], [0, 1]]}"), [], ["scene.yaml:12", "times of 'table' must increase", "0 after 1"]),
+    ("targets of three columns", pulled("displacement: {stiffness: 1, table: [[0, 0, 0]]}"), [], ["scene.yaml:12", "2 numbers"]),
+    ("no targets", pulled("displacement: {stiffness: 1, table: []}"), [], ["scene.yaml:12", "'table' is empty"]),
+    ("muscle without a pressure", pulled("mckibben: {braid_length: 0.3, turns: 1}"), [], ["scene.yaml:12", "needs a 'pressure' or a 'table'"]),
+    ("muscle without a braid", pulled("mckibben: {turns: 1, pressure: 1e5}"), [], ["scene.yaml:12", "needs the key 'braid_length'"]),
+    ("muscle of no turns", pulled("mckibben: {braid_length: 0.3, turns: 0, pressure: 1e5}"), [], ["scene.yaml:12", "'turns' must be greater than zero"]),
+    ("muscle over a joint without a length", tendon("{joint: elbow}", ", mckibben: {braid_length: 0.3, turns: 1, pressure: 1e5}"), [], ["scene.yaml:12", "needs its 'length' as drawn"]),
+    ("negative pressure in a table", pulled("mckibben: {braid_length: 0.3, turns: 1, table: [[0, -1]]}"), [], ["scene.yaml:12", "pressure must not be negative"]),
+    # scenes within scenes
+    ("missing scene to include", include("{file: nowhere.yaml}"), [], ["nowhere.yaml", "cannot be opened", "'include'"]),
+    ("include of no file", include("{prefix: b.}"), [], ["scene.yaml:9", "needs the key 'file'"]),
+    ("misspelt key of an include", include("{file: same.yaml, prefx: b.}"), [], ["scene.yaml:9", "unknown key 'prefx'", "did you mean 'prefix'"]),
+    ("include of a folder", include("{file: .}"), [], ["is a folder"]),
+    ("include of itself", include("{file: scene.yaml}"), [], ["scene.yaml:9", "'scene.yaml' includes itself"]),
+    ("include of itself by another", include("{file: there.yaml}"), [], ["there.yaml:1", "'scene.yaml' includes itself", "by way of"]),
+    ("include of another's circle", include("{file: itself.yaml}"), [], ["itself.yaml:1", "'itself.yaml' includes itself"]),
+    ("include of nothing", include("{file: empty.yaml}"), [], ["empty.yaml:1", "is empty"]),
+    ("mistake in an included scene", include("{file: misspelt.yaml}"), [], ["misspelt.yaml:2", "unknown key 'nam'"]),
+    ("include of a name twice", include("{file: weight.yaml}, {file: weight.yaml}"), [], ["scene.yaml:9", "a body 'weight' already", "another 'prefix'"]),
+    ("names twice behind one prefix", include("{file: weight.yaml, prefix: left.}, {file: weight.yaml, prefix: left.}"), [], ["scene.yaml:9", "a body 'left.weight' already"]),
+    ("rod named as one that is included", include("{file: same.yaml}"), [], ["scene.yaml:4", "'a'"]),
+    ("prefix without a letter", include("{file: same.yaml, prefix: ''}"), [], ["scene.yaml:9", "neither empty"]),
+    ("include by an angle", include("{file: same.yaml, prefix: b., rotation: 90}"), [], ["scene.yaml:9", "'rotation' must be a list of 3 numbers"]),
+    ("include of a frame that turns", include("{file: turning.yaml, prefix: b.}"), [], ["turning.yaml:9", "write 'rotation' into the outer one"]),
+    # motions to and fro
+    ("amplitude without a period", motion("{amplitude: [0.1, 0, 0]}"), [], ["scene.yaml:8", "belong together", "'period' is missing"]),
+    ("period without an amplitude", motion("{period: 1}"), [], ["scene.yaml:8", "belong together", "'amplitude' is missing"]),
+    ("period of zero", motion("{amplitude: [0.1, 0, 0], period: 0}"), [], ["scene.yaml:8", "'period' must be greater than zero"]),
+    ("amplitude and a table", motion("{amplitude: [0.1, 0, 0], period: 1, table: [[0, 0, 0, 0]]}"), [], ["scene.yaml:8", "not both"]),
+    ("amplitude of fix_twist", motion("{amplitude: [0.1, 0, 0], period: 1}", "fix_twist"), [], ["scene.yaml:8", "no position"]),
+    ("amplitude of a body without a period", bodies("{name: cube, sphere: {radius: 1}, mass: 1, motion: {amplitude: [1, 0, 0]}}"), [], ["scene.yaml:9", "'period' is missing"]),
+    ("amplitude of an obstacle without a period", (support, support + "\ncolliders: [{plane: {}, position: [0, -1, 0], motion: {amplitude: [0, 0.1, 0]}}]"), [], ["scene.yaml:9", "'period' is missing"]),
+    ("amplitude of a constraint without a period", (support, support + "\nconstraints: [{type: pin, vertex: 4, stiffness: 1, motion: {amplitude: [0, 0.1, 0]}}]"), [], ["scene.yaml:9", "'period' is missing"]),
+    ("cells of no size", bodies("{mesh: {file: plug.obj, cell: 0}, density: 1}"), [], ["scene.yaml:9", "'cell' must be greater than zero"]),
+    # neither rods nor bodies
+    ("neither rods nor bodies", ("rods:\n  - name: a\n    " + shape + "\n    material: {radius: 0.01, young: 1e7, poisson: 0.3, density: 1000}\nsupports:\n" + support + "\n", ""), [],
+     ["scene.yaml:1", "needs", "rod"]),
+    ("bodies that all stay", ("rods:\n  - name: a\n    " + shape + "\n    material: {radius: 0.01, young: 1e7, poisson: 0.3, density: 1000}\nsupports:\n" + support,
+     "bodies: [" + cube.replace("density", "fixed: true, density") + "]"), [], ["scene.yaml:1", "needs", "rod"]),
     # bodies and obstacles
     ("body named world", bodies("{name: world, sphere: {radius: 1}, mass: 1}"), [], ["scene.yaml:9", "must not be world"]),
     ("barrier wider than the body", bodies(cube.replace("density", "contact: {distance: 1}, density")), [], ["scene.yaml:9", "radius of gyration"]),

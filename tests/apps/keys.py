@@ -40,6 +40,13 @@ def defaults():
     assert compared > 15, f"only {compared} defaults were compared"
 
 
+# A scene for others to include.
+PART = "part.yaml"
+PART_TEXT = """bodies: [{name: weight, sphere: {radius: 0.05}, density: 1000, position: [3, 0, 0]}]
+joints: [{name: hook, type: ball, child: weight, point: [3, 0.2, 0]}]
+"""
+
+
 def put(scene, path, value):
     """Sets a value of a scene by its path, `rods[].line.edges`: the first of each list."""
     *blocks, last = path.split(".")
@@ -82,7 +89,37 @@ def exampleScene(path, value):
             joint["range"] = [-1, 1]
         if path in ("joints[].drive.damping", "joints[].drive.target"):
             joint["drive"]["stiffness"] = 10
-    if path.startswith(("bodies[]", "joints[]")) or path == "constraints[].body":
+    if path.startswith("include[]"):  # a weight on a hook, beside the scene
+        scene["include"][0]["file"] = PART
+    if path.startswith("tendons[]"):
+        tendon = scene["tendons"][0]
+        entry = (tendon.get("path") or [{}])[0]
+        from_world = {"body": "world", "point": [0, 0, -2]}
+        if name in ("axis", "side", "radius"):
+            entry.setdefault("cylinder", "cube")
+        if "cylinder" in entry or "sphere" in entry:  # between two points, and round the body that it moves
+            entry.setdefault("radius", 0.02)
+            tendon["path"] = [{"body": "world", "point": [x, 0.01, 0.01]} for x in (-1, 1)]
+            tendon["path"].insert(1, entry)
+        elif "joint" in entry or name == "coefficient":
+            entry.setdefault("joint", "elbow")
+            tendon["path"] = [entry]
+            scene["joints"] = [{"name": entry["joint"], "type": "hinge", "child": "cube", "point": [0, 0.5, 0]}]
+        elif "rod" in entry or name in ("vertex", "edge", "offset"):
+            entry.setdefault("rod", 0)
+            entry.setdefault("edge" if name in ("edge", "offset") else "vertex", "last")
+            tendon["path"] = [from_world, entry]
+        else:
+            entry.setdefault("body", "cube")
+            tendon["path"] = [from_world, entry]
+        if "table" not in tendon.get("force", {"table": 0}):
+            put(scene, "tendons[].force.tension", 10)
+        if "table" not in tendon.get("mckibben", {"table": 0}):
+            put(scene, "tendons[].mckibben.pressure", 1e5)
+    if path.endswith((".motion.amplitude", ".motion.period")):
+        put(scene, path.rpartition(".")[0] + ".amplitude", [0.1, 0, 0])
+        put(scene, path.rpartition(".")[0] + ".period", 2)
+    if path.startswith(("bodies[]", "joints[]", "tendons[]")) or path == "constraints[].body":
         body = scene.setdefault("bodies", [{}])[0]
         body.setdefault("name", "cube")
         if not any(shape in body for shape in ("box", "sphere", "capsule", "cylinder", "mesh")):
@@ -187,6 +224,8 @@ def examples():
             with tempfile.TemporaryDirectory() as folder:
                 with open(f"{folder}/s.yaml", "w") as f:
                     yaml.safe_dump(scene, f)
+                with open(f"{folder}/{PART}", "w") as f:
+                    f.write(PART_TEXT)
                 run = subprocess.run([program, "-scene", "s.yaml", *words], cwd=folder, capture_output=True, text=True)
                 assert run.returncode == 0, f"{path}: {key['example']}: exit code {run.returncode}\n{run.stderr}\n{yaml.safe_dump(scene)} {words}"
                 count += 1

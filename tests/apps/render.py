@@ -155,7 +155,7 @@ def rod_on_the_floor_touches_its_shadow():
 
 
 def trajectories_become_shapes():
-    """Rods of every section, a body that falls and colliders, in two frames side by side."""
+    """Rods of every section, a body that falls, a tendon and colliders, in two frames side by side."""
     def fake_rod(section, half_axes, closed=False):
         x = np.stack([np.linspace(0, 1, 5), np.zeros(5), np.zeros(5)], 1)
         return SimpleNamespace(
@@ -169,7 +169,10 @@ def trajectories_become_shapes():
 
     nan = np.nan
     t = SimpleNamespace(
-        time=np.array([0.0, 0.5]), field_names=["position", "force"], supports=[], unit=lambda name: "N",
+        time=np.array([0.0, 0.5]), field_names=["position", "force", "tendon_position"], supports=[],
+        unit=lambda name: "N", tendons=[SimpleNamespace(
+            segments=np.array([[0, 1], [1, 2], [3, 4]]),
+            position=lambda frame: np.array([[0, 0, 0], [0, 1, 0], [1, 1, 0], [2, 0, 0], [2, nan, 0]]))],
         field=lambda name: SimpleNamespace(place="edges" if name == "force" else "vertices"),
         rods=[fake_rod("circle", (0.1, 0.1)), fake_rod("rectangle", (0.1, 0.2)), fake_rod("ellipse", (0.1, 0.2)),
               fake_rod("none", (nan, nan)), fake_rod("circle", (nan, nan), closed=True)],
@@ -179,7 +182,11 @@ def trajectories_become_shapes():
     s = source.Source(t, "force", [0, 1], picture.LIGHT, lambda a, b: Colours(a, b, False), offset=(10, 0, 0))
     one, both = s.shapes([0], 0.001), s.shapes([0, 1], 0.001)
     bars = 4 * (8 + 48) + 4 + 44  # of rectangle and ellipse, with their ends
-    assert len(one.capsules) == 4 + 4 + 5 + 1 + 1 and len(one.triangles) == bars + 12 + 1 and len(one.planes) == 1
+    cords = s.tendon(0, 0).capsules
+    assert len(cords) == 2, "one line is not finite"
+    assert not cords.flat.any() and (cords.half_axes == s.tendon_radius).all()
+    assert 0 < s.tendon_radius < 0.1 and np.array_equal(cords.b[1], [1, 1, 0])
+    assert len(one.capsules) == 4 + 4 + 5 + 1 + 1 + 2 and len(one.triangles) == bars + 12 + 1 and len(one.planes) == 1
     assert len(both.capsules) == 2 * len(one.capsules) and both.points()[0][:, 0].max() > 10
     assert (s.half_axes(t.rods[3]) == 0).all() and (s.half_axes(t.rods[4]) == 0.01).all()
     assert np.allclose(source.value(t, "force", 0, 0), [0, 0.5, 1.5, 2.5, 3])
@@ -342,6 +349,20 @@ def helix_is_quick_and_the_same(tmp, helix):
     small(tmp, helix, "--field", "axial_force", "--dark", "--smooth", "--small", "--no-floor")
 
 
+def tendons_are_seen(tmp):
+    """Their red is that of nothing else; without rods that move, times are still times."""
+    out = f"{tmp}/finger"
+    subprocess.run([program, "-scene", root + "/data/scenes/finger_spatial.yaml", "-output_dir", out, "-t_end", "0.1"],
+                   check=True, stdout=subprocess.DEVNULL)
+    render(out, "--size", "640x360", "--out", f"{tmp}/x.png")
+    with Image.open(f"{tmp}/x.png") as image:
+        red, green, blue = np.moveaxis(np.asarray(image.convert("RGB"), float), -1, 0)
+    seen = (red > 2 * green) & (red > 2 * blue) & (red > 60)
+    columns = np.flatnonzero(seen.any(0))
+    assert np.ptp(columns) > 300 and 500 < seen.sum() < 8000, (columns, seen.sum())
+    assert not source.is_static(source.open_trajectory(out))
+
+
 straight_rods_cover_their_area()
 sections_follow_directors()
 bodies_cover_their_area()
@@ -355,6 +376,7 @@ with tempfile.TemporaryDirectory() as tmp:
     subprocess.run([program, "-scene", root + "/data/scenes/helix.yaml", "-output_dir", helix], check=True,
                    stdout=subprocess.DEVNULL)
     helix_is_quick_and_the_same(tmp, helix)
+    tendons_are_seen(tmp)
     odd_files(tmp)
     growing_and_killed(tmp)
     wrong_input(tmp, helix)

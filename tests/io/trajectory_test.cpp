@@ -137,6 +137,12 @@ TEST(Trajectory, EveryFieldHasAUnitAndAPlace) {
   ball.motion.velocity = Vec3(1, 0, 0);
   Body &body = scene.bodies.emplace_back();
   body.own = sphereMass(0.1, 1000);
+  Tendon &tendon = scene.tendons.emplace_back();
+  tendon.name = "tendon";
+  tendon.points.resize(2);
+  tendon.points[0].body = 0;
+  tendon.points[1].point = {1, 0, 0};
+  tendon.segments = {{0, 1}};
   const Written written(scene);
   for (const std::string &name : TrajectoryWriter::fieldNames()) {
     EXPECT_NE(written.attribute("state/" + name, "unit"), "(none)") << name;

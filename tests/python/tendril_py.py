@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """python/tendril.py against runs: tendril_py.py <tendril> <source folder>. Every field with its unit, growing and
-killed files, interpolation, format 1, bodies and colliders, and what goes wrong."""
+killed files, interpolation, format 1, bodies, colliders and tendons, and what goes wrong."""
 import os
 import shutil
 import signal
@@ -36,6 +36,21 @@ rods:
 supports:
   - {rod: 1, vertex: last, type: clamp}
   - {rod: 0, vertex: 0, type: pin}
+"""
+# Two blocks and a post between them, round which one of their tendons winds; another misses it.
+TENDONS = """gravity: [0, 0, 0]
+simulation: {dt: 0.01, t_end: 0.1}
+bodies:
+  - {name: post, cylinder: {radius: 0.1, length: 0.4}, mass: 1, fixed: true}
+  - {name: left, box: {size: [0.1, 0.1, 0.1]}, mass: 1, position: [-0.5, 0.05, 0]}
+  - {name: right, box: {size: [0.1, 0.1, 0.1]}, mass: 1, position: [0.5, 0.05, 0]}
+joints: [{name: rail, type: prismatic, child: left, axis: [1, 0, 0]}]
+tendons:
+  - {name: over, path: [{body: left}, {cylinder: post}, {body: right}], displacement: {stiffness: 10, target: -0.05}}
+  - {name: bent, path: [{body: left}, {body: world, point: [-0.5, 0.5, 0]}, {body: right, point: [0.5, 0.1, 0]}],
+     displacement: {stiffness: 50, damping: 2, table: [[0, 0], [0.1, -0.05]]}}
+  - {name: sum, path: [{joint: rail, coefficient: -2}], force: {tension: 1}}
+  - {name: clear, path: [{body: left, point: [-0.5, 0.2, 0]}, {cylinder: post}, {body: right, point: [0.5, 0.2, 0]}]}
 """
 ALL = "all,position_low,curvature,twist,strain_energy_density,force,moment"
 PLACES = {
@@ -106,7 +121,8 @@ def every_field_with_its_unit(folder):
     assert t.unit("kinetic") == "J" and t.unit("time") == "s" and t.unit("axial_stiffness") == "N"
     assert t.unit("half_axes") == "m" and t.unit("flexural_stiffness") == "N m^2" and t.unit("load_factor") == "1"
     assert np.array_equal(t.time, [0, 0.125, 0.25, 0.375, 0.5]) and t.step.tolist() == [0, 1, 2, 3, 4]
-    assert len(t.critical) == 0 and t.estimate is None and t.bodies == t.colliders == t.supports == []
+    assert len(t.critical) == 0 and t.estimate is None
+    assert t.bodies == t.colliders == t.tendons == t.supports == []
     assert t.summary["time"] == 0.5 and t.summary["largest_displacement"] > 1 and t.summary["centre_of_mass"].shape == (3,)
 
 
@@ -292,6 +308,53 @@ colliders:
     message(lambda: Trajectory(folder + "/out").contacts(), "-output_fields all,contacts")
 
 
+def tendons(folder):
+    run(folder, TENDONS)
+    t = Trajectory(folder + "/out")
+    over, bent, total, clear = t.tendons
+    assert t.tendons.names == ["over", "bent", "sum", "clear"] and t.tendons["bent"].index == 1
+    assert [c.actuator for c in t.tendons] == ["displacement", "displacement", "force", "none"]
+    assert [c.points for c in t.tendons] == [19, 3, 0, 19] and bent.segments.tolist() == [[0, 1], [1, 2]]
+    places = {"tendons": (4,), "tendon_points": (41, 3)}
+    for name, unit in (("displacement", "m"), ("length", "m"), ("rate", "m/s"), ("tension", "N"), ("position", "m")):
+        field = t.field("tendon_" + name)
+        assert field.unit == unit and field.shape == (len(t.time), *places[field.place]), field
+        assert (field.place == "tendon_points") == (name == "position")
+    frames = slice(None)
+
+    def drawn(tendon):
+        x = tendon.position(frames)
+        return np.linalg.norm(x[:, tendon.segments[:, 1]] - x[:, tendon.segments[:, 0]], axis=2).sum(1)
+
+    assert np.allclose(drawn(bent), bent.length(frames), rtol=1e-14)
+    assert np.allclose(drawn(clear), clear.length(frames), rtol=1e-14), "it meets nothing"
+    short = over.length(frames) - drawn(over)  # chords in place of arcs
+    assert (short > 0).all() and short.max() < 1e-5 and len(over.segments) == 18
+    touching = np.linalg.norm(over.position(-1)[1:-1, :2], axis=1)
+    assert np.allclose(touching, 0.1, rtol=1e-14), "on the post"
+    assert np.allclose(bent.position(frames)[:, 0], t.bodies["left"].position(frames), atol=1e-14)
+    assert np.allclose(bent.position(frames)[:, 1], [-0.5, 0.5, 0], atol=1e-14) and bent.position().shape == (3, 3)
+    for tendon in (over, bent, clear):
+        assert np.allclose(tendon.displacement(frames), tendon.length(frames) - tendon.length(0), atol=1e-14)
+    moved = t.bodies["left"].position(frames)[:, 0] + 0.5
+    assert np.allclose(total.displacement(frames), -2 * moved, atol=1e-14) and np.ptp(moved) > 1e-3
+    assert (total.tension(frames) == 1).all() and (total.length(frames) == 0).all()
+    assert (clear.tension(frames) == 0).all() and total.position(frames).shape == (len(t.time), 0, 3)
+    assert np.allclose(over.tension(frames), 10 * (over.displacement(frames) + 0.05), rtol=1e-12)
+    pull = 50 * (bent.displacement(frames) + 0.5 * t.time) + 2 * bent.rate(frames)
+    assert np.allclose(bent.tension(frames), np.maximum(pull, 0), rtol=1e-12, atol=1e-12) and bent.tension() > 0
+    between = t.at(0.035).tendons["over"]
+    assert abs(between.length() - over.length(slice(3, 5)).mean()) < 1e-15
+    assert np.allclose(between.position(), over.position(slice(3, 5)).mean(0), atol=1e-15)
+    message(lambda: t.tendons["flexor"], "'flexor'", "over, bent, sum, clear")
+    message(lambda: t.rods[0].field("tendon_tension"), "tendons", "not one of rods")
+    message(lambda: t.rods[0].field("tendon_position"), "tendon_points", "trajectory.tendons")
+    message(lambda: over.tension(100), "no frame 100")
+    run(folder, TENDONS[: TENDONS.index("  - {name: over")] + "  - {path: [{joint: rail}]}\n")
+    alone = Trajectory(folder + "/out").tendons[0]
+    assert (alone.name, alone.points, alone.position().shape, alone.segments.shape) == ("tendon0", 0, (0, 3), (0, 2))
+
+
 def wrong_input(folder):
     good, path = folder + "/out/trajectory.h5", folder + "/wrong.h5"
     t = Trajectory(good)
@@ -345,5 +408,8 @@ with tempfile.TemporaryDirectory() as main, tempfile.TemporaryDirectory() as oth
     killed(other)
     shutil.rmtree(other + "/out")
     statics(other)
+    shutil.rmtree(other + "/out")
+    tendons(other)
     format_1()
-print("fields, units, growing and killed files, times between frames, format 1, bodies, mistakes: all as documented")
+print("fields, units, growing and killed files, times between frames, format 1, bodies, tendons, mistakes: "
+      "all as documented")

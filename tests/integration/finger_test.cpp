@@ -1,0 +1,346 @@
+/// Mechanisms with tendons: the nine-link finger against its equilibria, slack and taut, work, trees that hold.
+#include "support/beams.hpp"
+#include "support/option_set.hpp"
+#include "support/touching.hpp"
+#include "tendril/energy/joint.hpp"
+#include "tendril/energy/tendon.hpp"
+#include "tendril/geometry/rotation.hpp"
+
+namespace tendril::test {
+namespace {
+
+constexpr double stiffness = 9817.477042468;
+
+/// Three bones with an eyelet each beside a held one, three hinges with springs, and a slider; see
+/// data/reference/bodies_finger_equilibria.csv. \param pulled by which the slider goes until t = 1
+Scene finger(bool spatial, double gravity, double pulled) {
+  Scene scene;
+  scene.gravity = {0, -gravity, 0};
+  Rod carrier = wire("carrier", {0, 1, 0}, {0.1, 1, 0}, 1);
+  carrier.contact.on = carrier.gravity = false;
+  scene.rods = {carrier};
+  scene.supports = {hold(scene, 0, 0, Support::Kind::pin), hold(scene, 0, 1, Support::Kind::pin)};
+  for (int k = 1; k < 4; ++k) {
+    Body bone;
+    bone.name = "bone" + std::to_string(k);
+    const double middle = 0.1 + 0.2 * k, lift = 0.05 * 0.01 / 0.11;
+    bone.own = {0.11, {middle, lift, 0}, Vec3(3e-5, 3e-4, 3.3e-4).asDiagonal()};
+    bone.position = {middle, 0, 0};
+    scene.bodies.push_back(bone);
+    Joint hinge{};
+    hinge.name = "hinge" + std::to_string(k);
+    hinge.type = Joint::Type::hinge;
+    hinge.child = k - 1;
+    hinge.parent = k - 2;
+    hinge.point = {0.2 * k, 0, 0};
+    hinge.axes = Mat3::Identity();
+    hinge.driven = true;
+    hinge.drive_stiffness = 0.5;
+    scene.joints.push_back(hinge);
+  }
+  Tendon t;
+  t.name = "flexor";
+  Waypoint slider, first;
+  slider.point = {-0.1, 0.05, 0};
+  slider.motion.table = {{0, Vec3::Zero(), Vec3::Zero()}, {1, Vec3(-pulled, 0, 0), Vec3::Zero()}};
+  first.point = {0.1, 0.05, 0};
+  t.points = {slider, first};
+  t.segments = {{0, 1}};
+  for (int k = 0; k < 3; ++k)
+    if (spatial) {
+      Waypoint eyelet;
+      eyelet.body = k;
+      eyelet.point = {0.3 + 0.2 * k, 0.05, 0};
+      t.points.push_back(eyelet);
+      t.segments.push_back({k + 1, k + 2});
+    } else
+      t.joints.push_back({k, -0.05});
+  t.actuator.kind = Actuator::Kind::displacement;
+  t.actuator.stiffness = stiffness;
+  scene.tendons = {t};
+  scene.hostBodies();
+  return scene;
+}
+
+TendonReading readingOf(const Simulation &run, bool dynamic = false) {
+  const Configuration c = configurationOf(run.state, run.scene, *run.elements, run.state.time);
+  return readTendon(run.scene, *run.elements, 0, run.state, c, dynamic);
+}
+double angleOf(const Simulation &run, int k) { return run.state.joints[std::size_t(k)].coordinate; }
+
+TEST(Finger, EquilibriaAreThoseOfTheTable) {
+  std::ifstream in(std::string(TENDRIL_SOURCE_DIR) + "/data/reference/bodies_finger_equilibria.csv");
+  std::string line, kind, cell;
+  int rows = 0;
+  while (std::getline(in, line)) {
+    if (line.empty() || line[0] == '#' || line.rfind("kind", 0) == 0) continue;
+    std::istringstream cells(line);
+    std::getline(cells, kind, ',');
+    std::vector<double> v;
+    while (std::getline(cells, cell, ',')) v.push_back(std::stod(cell));
+    const double gravity = v[3], pulled = v[4];
+    Simulation run;
+    LoopSettings settings = statics(4);
+    EXPECT_PETSC(run.setUp(finger(kind == "spatial", gravity, pulled), settings));
+    TimeLoop loop(run.solver, settings);
+    bool finished = false;
+    int steps = 0, iterations = 0;
+    EXPECT_PETSC(loop.run(
+        run.state,
+        [&](const State &, const Diagnostics &row) {
+          iterations += row.newton_iterations;
+          ++steps;
+          return PetscErrorCode(0);
+        },
+        &finished));
+    ASSERT_TRUE(finished) << line << loop.failure();
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(angleOf(run, k), v[std::size_t(5 + k)], 1e-6) << line;
+    EXPECT_NEAR(readingOf(run).tension, v[8], 1e-6 * v[8]) << line;
+    EXPECT_LE(iterations, 12 * steps) << line;
+    ++rows;
+  }
+  EXPECT_EQ(rows, 14);
+}
+
+/// The slider goes back, the tendon gets slack while the finger swings, and taut again: tension is nowhere negative,
+/// and each step takes few iterations.
+TEST(Finger, GoesSlackAndTautInFewIterations) {
+  Scene scene = finger(true, 0, 0.05);
+  scene.tendons[0].points[0].motion.table = {
+      {0, Vec3::Zero(), Vec3::Zero()}, {0.4, Vec3(-0.05, 0, 0), Vec3::Zero()}, {0.45, Vec3::Zero(), Vec3::Zero()}};
+  Simulation run;
+  const LoopSettings settings = dynamics(1.0 / 60, 2);
+  EXPECT_PETSC(run.setUp(scene, settings));
+  TimeLoop loop(run.solver, settings);
+  bool finished = false;
+  int most = 0, changes = 0;
+  bool taut = false;
+  EXPECT_PETSC(loop.run(
+      run.state,
+      [&](const State &, const Diagnostics &row) {
+        const TendonReading t = readingOf(run, true);
+        EXPECT_GE(t.tension, 0);
+        most = std::max(most, row.newton_iterations);
+        changes += (t.tension > 0) != taut;
+        taut = t.tension > 0;
+        return PetscErrorCode(0);
+      },
+      &finished));
+  ASSERT_TRUE(finished) << loop.failure();
+  EXPECT_GE(changes, 3);
+  EXPECT_LE(most, 6);
+}
+
+/// With energy and momentum kept, energies change by the work of the slider alone.
+TEST(Finger, TakesTheWorkOfItsSlider) {
+  for (const bool spatial : {true, false}) {
+    Scene scene = finger(spatial, 0, 0.02);
+    scene.tendons[0].actuator.stiffness = 200; // swings that the steps resolve
+    scene.tendons[0].points[0].motion.table[1].time = 0.5;
+    double before[2] = {0, 0}, off[2] = {0, 0};
+    for (const int finer : {1, 2}) {
+      Simulation run;
+      LoopSettings settings = dynamics(0.004 / finer, 0.5);
+      settings.integrator.name = "bdf2";
+      EXPECT_PETSC(run.setUp(scene, settings));
+      TimeLoop loop(run.solver, settings);
+      bool finished = false;
+      double work = 0, energy = 0;
+      EXPECT_PETSC(loop.run(
+          run.state,
+          [&](const State &, const Diagnostics &row) {
+            work += row.work.total();
+            energy = row.energy.total();
+            return PetscErrorCode(0);
+          },
+          &finished));
+      ASSERT_TRUE(finished) << loop.failure();
+      before[finer - 1] = energy;
+      off[finer - 1] = std::abs(work - energy);
+    }
+    EXPECT_GT(before[1], 1e-3);
+    EXPECT_LT(off[1], 0.03 * before[1]) << spatial; // what the method dissipates, and less of it with finer steps
+    EXPECT_LT(off[1], 0.6 * off[0]) << spatial;
+  }
+}
+
+/// A tendon with a damper at its end, in methods of second order: no damping but its own.
+TEST(Finger, ConvergesAtTheOrderOfItsMethodWithADamper) {
+  const OptionSet fine("-snes_rtol", "1e-10");
+  for (const std::string name : {"euler", "bdf2"}) {
+    std::vector<double> end;
+    for (const int n : {50, 100, 200, 400}) {
+      Scene scene = finger(true, 0, 0.04);
+      scene.tendons[0].actuator.stiffness = 300;
+      scene.tendons[0].actuator.damping = 8;
+      scene.tendons[0].points[0].motion.table = {};
+      scene.tendons[0].points[0].motion.amplitude = {-0.03, 0, 0};
+      scene.tendons[0].points[0].motion.period = 1;
+      Simulation run;
+      LoopSettings settings = dynamics(0.4 / n, 0.4);
+      settings.integrator.name = name;
+      EXPECT_PETSC(run.setUp(scene, settings));
+      TimeLoop loop(run.solver, settings);
+      bool finished = false;
+      EXPECT_PETSC(loop.run(
+          run.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+      ASSERT_TRUE(finished) << loop.failure();
+      end.push_back(angleOf(run, 0));
+    }
+    const double order = std::log2((end[1] - end[2]) / (end[2] - end[3]));
+    EXPECT_NEAR(order, name == "euler" ? 1 : 2, 0.25) << name << " " << end[0] << " " << end[3];
+  }
+}
+
+/// A backbone with one tendon beside it, from a held point to a disc at its tip: its moment is the same everywhere, and
+/// so is its curvature, N r/EI (Rucker and Webster 2011), where it is hardly compressed.
+TEST(SoftArm, BendsToAConstantCurvature) {
+  const double length = 0.24, offset = 0.012, tension = 3;
+  std::vector<double> turn;
+  double exact = 0;
+  for (const int edges : {12, 24, 48}) {
+    Scene scene;
+    scene.gravity = Vec3::Zero();
+    Rod rod = wire("backbone", {0, 0, 0}, {length, 0, 0}, edges, 0.002, 1e9);
+    rod.contact.on = rod.gravity = false;
+    rod.measure = Measure::angle;
+    rod.material.axial_stiffness = 1e9;
+    setBishopDirectors(rod, Vec3::UnitY());
+    scene.rods = {rod};
+    scene.supports = {hold(scene, 0, 0, Support::Kind::clamp)};
+    Body disc = shaped("sphere", {0.01, 0, 0}, {length, 0, 0});
+    disc.name = "disc";
+    disc.contact.on = disc.gravity = false;
+    scene.bodies = {disc};
+    Attachment weld{};
+    weld.name = "tip";
+    weld.rod = weld.body = 0;
+    weld.vertex = edges;
+    weld.weld = true;
+    weld.frame = frameAtVertex(rod, edges);
+    scene.attachments = {weld};
+    Tendon t;
+    t.name = "tendon";
+    Waypoint p;
+    p.point = {0, offset, 0};
+    t.points = {p};
+    for (int e = 0; e < edges; ++e) {
+      p = {};
+      p.rod = 0;
+      p.edge = e;
+      p.at = 0.5;
+      p.point = {0, offset, 0};
+      t.points.push_back(p);
+    }
+    p = {};
+    p.body = 0;
+    p.point = {length, offset, 0};
+    t.points.push_back(p);
+    for (int k = 0; k + 1 < int(t.points.size()); ++k) t.segments.push_back({k, k + 1});
+    t.actuator.kind = Actuator::Kind::force;
+    t.actuator.input_motion.table = {{0, Vec3::Zero(), Vec3::Zero()}, {1, Vec3(tension, 0, 0), Vec3::Zero()}};
+    scene.tendons = {t};
+    scene.hostBodies();
+    exact = tension * offset / rod.material.flexural_stiffness[0] * length;
+    Simulation run;
+    EXPECT_PETSC(run.setUp(scene, statics(4)));
+    TimeLoop loop(run.solver, statics(4));
+    bool finished = false;
+    EXPECT_PETSC(loop.run(
+        run.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+    ASSERT_TRUE(finished) << loop.failure();
+    const Vec3 tip = rotationOf(run.state, run.elements->groups - 1).col(0);
+    turn.push_back(std::atan2(tip[1], tip[0]) - exact);
+    if (edges < 48) continue;
+    const double radius = length / exact;
+    EXPECT_NEAR(run.state.position.back()[0], radius * std::sin(exact), 2e-3 * length);
+    EXPECT_NEAR(run.state.position.back()[1], radius * (1 - std::cos(exact)), 2e-3 * length);
+  }
+  EXPECT_GT(exact, 0.6);
+  EXPECT_LT(std::abs(turn[2]), 2e-3 * exact) << turn[0] << " " << turn[1] << " " << turn[2];
+  EXPECT_GT(turn[1] / turn[2], 3) << "second order";
+}
+
+/// A drum of radius R that a motor turns draws a load up by R times its turn, through three turns.
+TEST(Winch, DrawsUpByItsRadius) {
+  Scene scene = finger(true, 9.81, 0);
+  scene.bodies.resize(2);
+  scene.joints.resize(2);
+  for (int k = 0; k < 2; ++k) {
+    scene.bodies[std::size_t(k)].own = sphereMass(0.05, 1000).moved(Mat3::Identity(), {0.5 * k, -0.4 * k, 0});
+    scene.bodies[std::size_t(k)].position = {0.5 * k, -0.4 * k, 0};
+    scene.joints[std::size_t(k)].parent = -1;
+    scene.joints[std::size_t(k)].child = k;
+    scene.joints[std::size_t(k)].point = scene.bodies[std::size_t(k)].position;
+  }
+  Joint &drum = scene.joints[0], &guide = scene.joints[1];
+  drum.drive_stiffness = -1; // a motor
+  drum.target_motion.table = {{0, Vec3::Zero(), Vec3::Zero()}, {1, Vec3(6 * pi, 0, 0), Vec3::Zero()}};
+  guide.type = Joint::Type::prismatic;
+  guide.driven = false;
+  guide.axes << 0, 0, 1, 1, 0, 0, 0, 1, 0;
+  guide.axes = rotationBy({-0.5 * pi, 0, 0}); // along y
+  Tendon t;
+  t.name = "hoist";
+  Waypoint top, load;
+  top.point = {0.5, 1, 0};
+  load.body = 1;
+  load.point = scene.bodies[1].position;
+  t.points = {top, load};
+  t.segments = {{0, 1}};
+  t.joints = {{0, 0.03}};
+  t.actuator.kind = Actuator::Kind::displacement;
+  t.actuator.stiffness = 1e5;
+  scene.tendons = {t};
+  scene.hostBodies();
+  Simulation run;
+  LoopSettings settings = dynamics(0.01, 1);
+  EXPECT_PETSC(run.setUp(scene, settings));
+  TimeLoop loop(run.solver, settings);
+  bool finished = false;
+  EXPECT_PETSC(loop.run(
+      run.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+  ASSERT_TRUE(finished) << loop.failure();
+  EXPECT_NEAR(angleOf(run, 0), 6 * pi, 1e-9);
+  const double weight = run.scene.bodies[1].own.mass * 9.81;
+  EXPECT_NEAR(run.state.body_position[1][1] + 0.4, 0.03 * 6 * pi - weight / 1e5, 1e-4);
+}
+
+/// A tree in a spin far from small, with a joint of each kind: its joints hold to rounding, whatever Newton's path.
+TEST(Trees, HoldToRounding) {
+  Scene scene = finger(true, 9.81, 0);
+  scene.tendons.clear();
+  scene.joints[1].type = Joint::Type::ball;
+  scene.joints[1].driven = false;
+  scene.joints[2].type = Joint::Type::cylindrical;
+  scene.joints[2].driven = false;
+  for (Joint &j : scene.joints) j.drive_stiffness = j.driven ? 0.5 : -1;
+  scene.bodies[2].velocity = {0, 0, 1};
+  scene.bodies[2].angular_velocity = Vec3::Zero();
+  Simulation run;
+  const LoopSettings settings = dynamics(0.02, 2);
+  EXPECT_PETSC(run.setUp(scene, settings));
+  TimeLoop loop(run.solver, settings);
+  bool finished = false;
+  double most = 0, farthest = 0;
+  EXPECT_PETSC(loop.run(
+      run.state,
+      [&](const State &, const Diagnostics &) {
+        const Configuration c = configurationOf(run.state, run.scene, *run.elements, run.state.time);
+        for (int k = 0; k < 3; ++k) {
+          const Joint &joint = run.scene.joints[std::size_t(k)];
+          const JointPlace place = placeOf(joint, run.elements->pairOf(k), *run.elements, c);
+          for (int row = 0; row < coordinate_row; ++row)
+            if (holds(joint, row)) most = std::max(most, std::abs(jointRow(joint, place, row).value));
+        }
+        farthest = std::max(farthest, std::abs(angleOf(run, 0)));
+        return PetscErrorCode(0);
+      },
+      &finished));
+  ASSERT_TRUE(finished) << loop.failure();
+  EXPECT_GT(farthest, 0.9);
+  EXPECT_LT(most, 1e-14);
+}
+
+} // namespace
+} // namespace tendril::test
