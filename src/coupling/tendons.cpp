@@ -151,6 +151,7 @@ private:
   Pull pull(int k, const Configuration &c) const {
     const TendonPath &path = paths_[std::size_t(k)];
     const double x = path.displacement(c);
+    if (path.tendon().actuator.kind == Actuator::Kind::none) return {};
     if (!std::isfinite(x)) return {HUGE_VAL, 0, 0};
     return pullOf(path.tendon().actuator, x, path.input(c), work_[std::size_t(k)].damper);
   }
@@ -172,7 +173,9 @@ private:
     forVariables(path, [&](Eigen::Index v, int a, int slot) { sum += by[v] * increment[a][slot]; });
     return sum;
   }
+  /// One that pulls on one thing alone has that with itself, without entries: its rod goes as rods do that are joined.
   template <class Visit> static void forPairs(const TendonPath &path, Visit visit) {
+    if (path.carriers().size() == 1) visit(0, 0);
     for (std::size_t b = 0; b < path.carriers().size(); ++b)
       for (std::size_t a = 0; a < b; ++a) visit(a, b);
   }
@@ -200,6 +203,7 @@ private:
     int number = first_number_[std::size_t(k)];
     if (!any) return;
     forPairs(path, [&](std::size_t a, std::size_t b) {
+      if (a == b) return;
       const bool swapped = path.carriers()[a].rod < path.carriers()[b].rod; // as pairOf
       const Carrier::Hessian h = swapped ? block(b, a) : block(a, b);
       double *const to = out.blocks.touching(number++);

@@ -23,6 +23,12 @@ void requireDeadLoads(const Scene &scene) {
       throw SceneError("joint '" + j.name +
                        "' is moved, by its parent or its drive: -continuation arclength scales dead loads only; hold "
                        "it still or use -continuation load");
+  for (const Tendon &t : scene.tendons)
+    if (t.actuator.input_motion.moves() ||
+        std::any_of(t.points.begin(), t.points.end(), [](const Waypoint &p) { return p.motion.moves(); }))
+      throw SceneError("tendon '" + t.name +
+                       "' is given a table, or a point of it moves: -continuation arclength scales dead loads only; "
+                       "hold it still or use -continuation load");
   const bool heavy = !scene.gravity.isZero(0),
              weight =
                  heavy && std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &r) { return r.gravity; }),

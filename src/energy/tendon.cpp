@@ -334,6 +334,21 @@ double TendonPath::rate(const State &state, const Configuration &c) const {
   return sum;
 }
 
+double TendonPath::clearance(const Configuration &c) const {
+  double least = HUGE_VAL;
+  for (const Tendon::Segment &s : tendon().segments) {
+    if (s.wrap < 0) continue;
+    const Wrap &wrap = tendon().wraps[std::size_t(s.wrap)];
+    const Round &round = rounds_[std::size_t(s.wrap)];
+    for (const int point : {s.from, s.to}) {
+      Vec3 arm = axesOf(round, c).transpose() * placeOf(points_[std::size_t(point)], c).from(placeOf(round.centre, c));
+      if (!wrap.sphere) arm[2] = 0;
+      least = std::min(least, arm.norm() / wrap.radius - 1);
+    }
+  }
+  return least;
+}
+
 double TendonPath::blur(const Configuration &c) const {
   double size = 0;
   for (const Carried &p : points_) {

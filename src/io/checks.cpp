@@ -35,6 +35,10 @@ void requireHeld(const Scene &scene) {
     if (s.holdsPosition()) held[rootOf(s.rod)] = true;
   for (const Constraint &c : scene.constraints)
     if (c.isPin() && c.isToWorld() && c.stiffness > 0) held[rootOf(c.rod)] = true;
+  for (const Tendon &t : scene.tendons)
+    if (t.actuator.stiffness > 0 &&
+        std::any_of(t.points.begin(), t.points.end(), [](const Waypoint &p) { return p.isTold(); }))
+      held[rootOf(t.rod)] = true;
   for (int r = 0; r < int(scene.rods.size()); ++r)
     if (scene.touches(r) || scene.rods[r].contact.touchesMoving())
       held[rootOf(r)] = true; // what obstacles, other rods and bodies hold shows

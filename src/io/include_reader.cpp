@@ -249,6 +249,9 @@ void append(SceneFile part, const std::string &prefix, const YamlValue &where, S
   for (const auto &[vertex, numbers] : part.supports_at)
     for (const int k : numbers) out.supports_at[{vertex.first + rods, vertex.second}].push_back(k + supports);
   out.ignored_pairs += part.ignored_pairs;
+  out.constraint_blocks += part.constraint_blocks;
+  out.junction_blocks += part.junction_blocks;
+  out.joint_blocks += part.joint_blocks;
   auto add = [](auto &to, auto &items) {
     to.insert(to.end(), std::make_move_iterator(items.begin()), std::make_move_iterator(items.end()));
   };

@@ -120,10 +120,12 @@ std::string boundsText(const Key &key) {
 std::string rulesOf(std::string_view block) {
   if (block.empty())
     return R"("anyOf": [{"required": ["rods"]}, {"required": ["bodies"]}, {"required": ["include"]}],
- "if": {"required": ["contact"]}, "then": {"anyOf": [{"required": ["colliders"]},
- {"properties": {"contact": {"required": ["rods"], "properties": {"rods": {"enum": ["others", "all"]}}}}},
- {"properties": {"rods": {"contains": {"required": ["contact"],
-  "properties": {"contact": {"type": "object", "required": ["rods"], "properties": {"rods": {"enum": ["others", "all"]}}}}}}}}]})";
+ "if": {"required": ["contact"]}, "then": {"anyOf": [{"required": ["colliders"]}, {"required": ["include"]},
+ {"properties": {"contact": {"anyOf": [{"required": ["rods"], "properties": {"rods": {"enum": ["others", "all"]}}}, {"required": ["bodies"], "properties": {"bodies": {"const": true}}}]}}},
+ {"required": ["rods"], "properties": {"rods": {"contains": {"required": ["contact"],
+  "properties": {"contact": {"type": "object", "anyOf": [{"required": ["rods"], "properties": {"rods": {"enum": ["others", "all"]}}}, {"required": ["bodies"], "properties": {"bodies": {"const": true}}}]}}}}}},
+ {"required": ["bodies"], "properties": {"bodies": {"contains": {"required": ["contact"],
+  "properties": {"contact": {"type": "object", "required": ["bodies"], "properties": {"bodies": {"const": true}}}}}}}}]})";
   if (block == "rods[]")
     return R"("oneOf": [{"required": ["line"]}, {"required": ["ring"]}, {"required": ["helix"]}, {"required": ["points"]}, {"required": ["file"]}])";
   if (block == "rods[].material")

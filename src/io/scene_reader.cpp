@@ -64,9 +64,9 @@ void keepFiles(const YamlValue &rods, SceneSource &source) {
 using Includes = std::vector<std::string>;
 
 /// Reads a file. \return the map that it is
-YamlMap openScene(const std::string &path, const std::string &none, SceneFile &out) {
-  if (std::filesystem::is_directory(path)) throw SceneError(path + ": is a folder; give a scene file");
-  out.source.text = readText(path, none);
+YamlMap openScene(const std::string &path, SceneFile &out) {
+  if (std::filesystem::is_directory(path)) throw SceneError(path + ": is a folder; give a scene file with -scene");
+  out.source.text = readText(path, ": cannot be opened; give an existing scene file with -scene");
   const std::vector<YAML::Node> documents = loadYaml(out.source.text, path);
   if (documents.empty() || documents[0].IsNull())
     throw SceneError(path + ":1: is empty; a scene needs at least 'rods'");
@@ -95,7 +95,8 @@ void readBlocks(YamlMap &map, const Overrides &overrides, Includes &within, Scen
   if (map.has("bodies"))
     for (const YamlValue &v : map.at("bodies").items()) readBody(v, sums.contact, out);
   if (out.scene.rods.empty() && out.scene.bodies.empty())
-    map.at("rods").fail("a scene needs at least one rod, or body that is free");
+    (map.has("rods") ? map.at("rods") : map.value())
+        .fail("a scene needs at least one rod, in 'rods', or body that is free, in 'bodies'");
   if (map.has("joints"))
     for (const YamlValue &v : map.at("joints").items()) readJoint(v, out);
   if (map.has("tendons"))
@@ -125,11 +126,13 @@ void readIncludes(YamlMap &map, const Overrides &overrides, Includes &within, Sc
     const YamlValue file = block.at("include[].file");
     const std::string path = (std::filesystem::path(file.file()).parent_path() / file.text()).string(),
                       name = std::filesystem::weakly_canonical(path).string(),
-                      prefix = block.has("include[].prefix") ? readName(block.at("include[].prefix")) : "";
+                      prefix = block.has("include[].prefix") ? block.at("include[].prefix").text() : "";
     if (std::find(within.begin(), within.end(), name) != within.end())
       file.fail("'" + file.text() + "' includes itself, by way of what it includes");
+    if (!std::filesystem::is_regular_file(path)) file.fail(path + " is no file; 'file' names a scene beside this one");
+    if (prefix != inOneLine(prefix)) block.at("include[].prefix").fail("'prefix' must be in one line");
     SceneFile part;
-    YamlMap whole = openScene(path, ": cannot be opened; 'include' names a scene beside this one", part);
+    YamlMap whole = openScene(path, part);
     within.push_back(name);
     readBlocks(whole, overrides, within, part);
     within.pop_back();
@@ -148,7 +151,7 @@ void readIncludes(YamlMap &map, const Overrides &overrides, Includes &within, Sc
 
 SceneFile readScene(const std::string &path, const Overrides &overrides) {
   SceneFile out;
-  YamlMap map = openScene(path, ": cannot be opened; give an existing scene file with -scene", out);
+  YamlMap map = openScene(path, out);
   Includes within{std::filesystem::weakly_canonical(path).string()};
   readBlocks(map, overrides, within, out);
   Scene &scene = out.scene;

@@ -21,6 +21,7 @@ std::string readName(const YamlValue &value) {
 }
 
 std::vector<int> readTargets(YamlMap &map, KeyOf<KeyType::rod> key, const RodNames &rods) {
+  if (rods.count() == 0) map.value().fail("this is for a rod, and the scene has no 'rods' before it");
   if (!map.has(*key)) {
     if (rods.count() > 1) map.value().fail("say which 'rod' is meant: a name, a number from 0, or all");
     return {0};

@@ -198,7 +198,13 @@ double measure(const YamlValue &value, const SceneFile &file, const Tendon &tend
                      "; move it out, or take a smaller 'radius'");
       }
     }
-    sum += segmentAsDrawn(file.scene, tendon, s);
+    const double length = segmentAsDrawn(file.scene, tendon, s);
+    if (!std::isfinite(length))
+      value.fail("by which way it winds round from point " + std::to_string(s.from) + " to point " +
+                 std::to_string(s.to) +
+                 " cannot be told as they are drawn: in line with the middle of a sphere, or about three quarters of a "
+                 "turn round a cylinder with a 'side'; put a point between");
+    sum += length;
   }
   return sum;
 }

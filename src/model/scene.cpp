@@ -316,7 +316,7 @@ bool Scene::hasCouples() const {
 }
 
 bool Scene::isJoined() const {
-  return !junctions.empty() || !bodies.empty() ||
+  return !junctions.empty() || !bodies.empty() || !tendons.empty() ||
          std::any_of(constraints.begin(), constraints.end(), [](const Constraint &c) { return c.isTie(); });
 }
 

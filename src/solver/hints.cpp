@@ -1,5 +1,7 @@
 #include "tendril/solver/hints.hpp"
 
+#include "tendril/energy/tendon.hpp"
+
 #include "tendril/contact/contact.hpp"
 #include "tendril/contact/touching_bodies.hpp"
 #include "tendril/energy/constraint.hpp"
@@ -96,6 +98,18 @@ std::string nearRod(const IncrementalPotential &potential, RodSet rods) {
     break;
   }
   return hint.str();
+}
+
+std::string tightTendon(const IncrementalPotential &potential, RodSet rods) {
+  constexpr double near = 0.01;
+  const Scene &scene = potential.scene();
+  for (int k = 0; k < int(scene.tendons.size()); ++k) {
+    const Tendon &t = scene.tendons[k];
+    if (t.rod < rods.begin || t.rod >= rods.end) continue;
+    if (const double gap = TendonPath(scene, potential.elements(), k).clearance(potential.iterate()); gap < near)
+      return "; a point of tendon '" + t.name + "' comes to the surface that it winds round, which it cannot pass";
+  }
+  return {};
 }
 
 std::string fastBody(const IncrementalPotential &potential, RodSet rods) {

@@ -243,7 +243,9 @@ bool IncrementalPotential::moveOn(double time, const StageRule &end) {
   for (int r = 0; r < all().end; ++r) {
     supports_.follow(r, iterate_);
     if (!tryMove(increment, 1, r, RetractionKind::additive, trial)) return false;
-    if (!elements_.constraintsOf(r).empty() && !std::isfinite(rodEnergy(trial, r).value)) return false;
+    if (!(elements_.constraintsOf(r).empty() && elements_.tendonsOf(r).empty()) &&
+        !std::isfinite(rodEnergy(trial, r).value))
+      return false;
     accept(trial, r);
     const RodRange &rod = elements_.rods[r];
     if (rod.twist && !end.halfway.empty()) {

@@ -383,7 +383,7 @@ PetscErrorCode NewtonSolver::solve(const State &start, NewtonReport *report, See
   report_.reason = "converged";
   if (!report_.converged) {
     report_.reason = now.failure + nearBarrier(*potential_, rods_) + nearObstacle(*potential_, rods_) +
-                     nearRod(*potential_, rods_) + fastBody(*potential_, rods_);
+                     nearRod(*potential_, rods_) + fastBody(*potential_, rods_) + tightTendon(*potential_, rods_);
     if (now.beyond.empty()) // 0.88 of the moment, 0.98 of the force
       report_.reason += limitOfLaw(*potential_, rods_, potential_->start(), 0.5, HUGE_VAL, 0.65);
   }

@@ -261,6 +261,67 @@ TEST(SoftArm, BendsToAConstantCurvature) {
   EXPECT_GT(turn[1] / turn[2], 3) << "second order";
 }
 
+/// A cable that a tendon holds by its last vertex, as a support does, in its two solvers; and one over three of its own
+/// vertices, which draws them together.
+TEST(TendonsOnARod, HoldItWhereTheyPull) {
+  Scene scene;
+  scene.gravity = {0, -9.81, 0};
+  Rod rod = wire("rod", {0, 0, 0}, {1, 0, 0}, 10, 0.01, 1e9);
+  rod.contact.on = false;
+  scene.rods = {rod};
+  scene.supports = {hold(scene, 0, 0, Support::Kind::clamp)};
+  Waypoint end, top;
+  end.rod = 0;
+  end.setVertex(10, 10);
+  top.point = {1, 1, 0};
+  Tendon stay;
+  stay.name = "stay";
+  stay.points = {end, top};
+  stay.segments = {{0, 1}};
+  stay.actuator.kind = Actuator::Kind::displacement;
+  stay.actuator.stiffness = 1e5;
+  scene.tendons = {stay};
+  scene.hostBodies();
+  auto rested = [](const Scene &what) {
+    Simulation run;
+    [&] { EXPECT_PETSC(run.setUp(what, statics(2))); }();
+    TimeLoop loop(run.solver, statics(2));
+    bool finished = false;
+    [&] {
+      EXPECT_PETSC(loop.run(
+          run.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+    }();
+    EXPECT_TRUE(finished) << loop.failure();
+    const Configuration c = configurationOf(run.state, run.scene, *run.elements, 1);
+    return std::pair(run.state, what.tendons.empty() ? TendonReading()
+                                                     : readTendon(run.scene, *run.elements, 0, run.state, c, false));
+  };
+  const auto [held, reading] = rested(scene);
+  Scene pinned = scene; // a spring of the same stiffness along y, to which the tendon is one for a small sag
+  pinned.tendons.clear();
+  pinned.constraints = {pinTo(pinned, 0, 10, Vec3::Zero(), 1e5)};
+  const auto [sprung, none] = rested(pinned);
+  EXPECT_NEAR(reading.tension, 3.0 / 8 * rod.material.linear_density * 9.81, 0.02); // of ten edges
+  EXPECT_NEAR(held.position.back()[1], -reading.displacement, 1e-6);
+  EXPECT_NEAR(held.position.back()[1], sprung.position.back()[1], 5e-6);
+  Tendon own = stay;
+  own.points = {};
+  for (const int v : {0, 5, 10}) {
+    Waypoint p;
+    p.rod = 0;
+    p.setVertex(v, 10);
+    own.points.push_back(p);
+  }
+  own.segments = {{0, 1}, {1, 2}};
+  own.actuator.kind = Actuator::Kind::force;
+  own.actuator.input = 10;
+  scene.gravity.setZero();
+  scene.tendons = {own};
+  const auto [shortened, pull] = rested(scene);
+  EXPECT_EQ(pull.tension, 10);
+  EXPECT_NEAR(pull.displacement, -10 / rod.material.axial_stiffness, 0.05 * 10 / rod.material.axial_stiffness);
+}
+
 /// A drum of radius R that a motor turns draws a load up by R times its turn, through three turns.
 TEST(Winch, DrawsUpByItsRadius) {
   Scene scene = finger(true, 9.81, 0);

@@ -64,6 +64,8 @@ public:
   /// Rate of its displacement at a state [m/s].
   double rate(const State &state, const Configuration &c) const;
   double input(const Configuration &c) const { return c.positionAt(slot_)[0]; }
+  /// How far its points are at least from what they wind round, over its radius; infinite where there is nothing.
+  double clearance(const Configuration &c) const;
   /// How far rounding blurs its displacement [m].
   double blur(const Configuration &c) const;
 

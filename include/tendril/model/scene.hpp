@@ -154,7 +154,7 @@ struct Scene {
   std::vector<int> rodsOf(const Tendon &tendon) const;
   /// Whether a tendon runs through points beside the axis of a rod, which its twist moves.
   bool tendonsTwist() const;
-  /// Whether junctions, ties or bodies join rods.
+  /// Whether junctions, ties, bodies or tendons join rods.
   bool isJoined() const;
   std::vector<NodalForce> forces;
   std::vector<EdgeMoment> moments;

@@ -19,6 +19,8 @@ std::string nearRod(const IncrementalPotential &potential, RodSet rods);
 
 /// On the first body that turns by more than a radian in the step.
 std::string fastBody(const IncrementalPotential &potential, RodSet rods);
+/// A tendon whose point has come to the surface that the tendon winds round.
+std::string tightTendon(const IncrementalPotential &potential, RodSet rods);
 
 /// Words on a rod of the energy `seed` that is near a limit of its law, or beyond: of bending, more sharply than
 /// `sharpest` (in units of the limit) with edges shorter than `longest`, or of compression with an edge shorter than
