@@ -94,6 +94,11 @@ public:
     }
     return sum;
   }
+  double forceNoise(const Configuration &c, int rod) const override {
+    double sum = 0;
+    for (const int k : by_rod_.of(rod)) sum += pull(k, c).stiffness * paths_[std::size_t(k)].blur(c);
+    return sum;
+  }
   void addEnergies(const State &, const Configuration &c, double, int rod, EnergyBudget &out) const override {
     for (const int k : by_rod_.of(rod)) {
       const TendonPath &path = paths_[std::size_t(k)];

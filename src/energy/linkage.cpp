@@ -135,7 +135,7 @@ void Linkage::follow(const Link &link, const Configuration &from, const Planes &
   }
 }
 
-void Linkage::correct(const Configuration &from, const Planes &increment, double scale, int r, Planes &out) const {
+double Linkage::correct(const Configuration &from, const Planes &increment, double scale, int r, Planes &out) const {
   const RodRange &rod = elements_.rods[std::size_t(r)];
   if (out.size() == 0) out = Planes(slot_size, elements_.slots);
   for (int a = 0; a < slot_size; ++a)
@@ -160,6 +160,11 @@ void Linkage::correct(const Configuration &from, const Planes &increment, double
   for (const JoinedEdge &j : elements_.joinedEdges({r, r + 1}))
     if (j.of_body && in_tree_[std::size_t(j.group - first_group)])
       out.setVector(0, j.frame, moves_[std::size_t(j.group - first_group)].turn);
+  double most = 0;
+  for (const int host : hosts_[std::size_t(r)])
+    for (const JoinedBody &b : elements_.bodies({host, host + 1}))
+      if (in_tree_[std::size_t(b.body)]) most = std::max(most, moves_[std::size_t(b.body)].turn.norm());
+  return most;
 }
 
 } // namespace tendril

@@ -89,8 +89,9 @@ static double forceOf(const Scene &scene, const Body &body, double size) {
   double force = body.own.mass * scene.gravity.norm() + body.force.norm() + body.torque.norm() / size;
   for (const Joint &j : scene.joints) force = std::max(force, j.drive_stiffness / size);
   for (const Tendon &t : scene.tendons)
-    force = std::max(
-        {force, 1e-3 * size * stiffnessAsDrawn(t), t.actuator.kind == Actuator::Kind::force ? t.actuator.input : 0});
+    if (t.actuator.kind == Actuator::Kind::force) force = std::max(force, t.actuator.input);
+  for (const Tendon &t : scene.tendons) // where nothing else is known
+    if (force == 0) force = 1e-6 * size * stiffnessAsDrawn(t);
   return force > 0 ? force : body.own.mass * size;
 }
 

@@ -38,7 +38,10 @@ bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r,
   if (dofs_.isCoupled(dofs_.islandOf(r))) kind = RetractionKind::additive;
   const bool linked = linkage_.moves(r);
   if (linked) {
-    linkage_.correct(iterate_, increment, scale, r, linked_);
+    // At rest nothing but what holds a mechanism limits its turns: where that is little, a linear step turns it many
+    // times.
+    constexpr double far = 1;
+    if (!(linkage_.correct(iterate_, increment, scale, r, linked_) < far) && step_.isStatic()) return false;
     dofs_.copyBehindRing(elements_.rods[r], linked_);
   }
   if (!retraction_.apply(iterate_, linked ? linked_ : increment, linked ? 1 : scale, r, kind, trial)) return false;

@@ -81,19 +81,11 @@ TEST(Finger, EquilibriaAreThoseOfTheTable) {
     const double gravity = v[3], pulled = v[4];
     Simulation run;
     LoopSettings settings = statics(4);
-    EXPECT_PETSC(run.setUp(finger(kind == "spatial", gravity, pulled), settings));
-    TimeLoop loop(run.solver, settings);
-    bool finished = false;
     int steps = 0, iterations = 0;
-    EXPECT_PETSC(loop.run(
-        run.state,
-        [&](const State &, const Diagnostics &row) {
-          iterations += row.newton_iterations;
-          ++steps;
-          return PetscErrorCode(0);
-        },
-        &finished));
-    ASSERT_TRUE(finished) << line << loop.failure();
+    runAndWatch(run, finger(kind == "spatial", gravity, pulled), settings, [&](const Diagnostics &row) {
+      iterations += row.newton_iterations;
+      ++steps;
+    });
     for (int k = 0; k < 3; ++k) EXPECT_NEAR(angleOf(run, k), v[std::size_t(5 + k)], 1e-6) << line;
     EXPECT_NEAR(readingOf(run).tension, v[8], 1e-6 * v[8]) << line;
     EXPECT_LE(iterations, 12 * steps) << line;
@@ -110,23 +102,15 @@ TEST(Finger, GoesSlackAndTautInFewIterations) {
       {0, Vec3::Zero(), Vec3::Zero()}, {0.4, Vec3(-0.05, 0, 0), Vec3::Zero()}, {0.45, Vec3::Zero(), Vec3::Zero()}};
   Simulation run;
   const LoopSettings settings = dynamics(1.0 / 60, 2);
-  EXPECT_PETSC(run.setUp(scene, settings));
-  TimeLoop loop(run.solver, settings);
-  bool finished = false;
   int most = 0, changes = 0;
   bool taut = false;
-  EXPECT_PETSC(loop.run(
-      run.state,
-      [&](const State &, const Diagnostics &row) {
-        const TendonReading t = readingOf(run, true);
-        EXPECT_GE(t.tension, 0);
-        most = std::max(most, row.newton_iterations);
-        changes += (t.tension > 0) != taut;
-        taut = t.tension > 0;
-        return PetscErrorCode(0);
-      },
-      &finished));
-  ASSERT_TRUE(finished) << loop.failure();
+  runAndWatch(run, scene, settings, [&](const Diagnostics &row) {
+    const TendonReading t = readingOf(run, true);
+    EXPECT_GE(t.tension, 0);
+    most = std::max(most, row.newton_iterations);
+    changes += (t.tension > 0) != taut;
+    taut = t.tension > 0;
+  });
   EXPECT_GE(changes, 3);
   EXPECT_LE(most, 6);
 }
@@ -142,19 +126,11 @@ TEST(Finger, TakesTheWorkOfItsSlider) {
       Simulation run;
       LoopSettings settings = dynamics(0.004 / finer, 0.5);
       settings.integrator.name = "bdf2";
-      EXPECT_PETSC(run.setUp(scene, settings));
-      TimeLoop loop(run.solver, settings);
-      bool finished = false;
       double work = 0, energy = 0;
-      EXPECT_PETSC(loop.run(
-          run.state,
-          [&](const State &, const Diagnostics &row) {
-            work += row.work.total();
-            energy = row.energy.total();
-            return PetscErrorCode(0);
-          },
-          &finished));
-      ASSERT_TRUE(finished) << loop.failure();
+      runAndWatch(run, scene, settings, [&](const Diagnostics &row) {
+        work += row.work.total();
+        energy = row.energy.total();
+      });
       before[finer - 1] = energy;
       off[finer - 1] = std::abs(work - energy);
     }
@@ -179,12 +155,7 @@ TEST(Finger, ConvergesAtTheOrderOfItsMethodWithADamper) {
       Simulation run;
       LoopSettings settings = dynamics(0.4 / n, 0.4);
       settings.integrator.name = name;
-      EXPECT_PETSC(run.setUp(scene, settings));
-      TimeLoop loop(run.solver, settings);
-      bool finished = false;
-      EXPECT_PETSC(loop.run(
-          run.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
-      ASSERT_TRUE(finished) << loop.failure();
+      runTo(run, scene, settings);
       end.push_back(angleOf(run, 0));
     }
     const double order = std::log2((end[1] - end[2]) / (end[2] - end[3]));
@@ -243,12 +214,7 @@ TEST(SoftArm, BendsToAConstantCurvature) {
     scene.hostBodies();
     exact = tension * offset / rod.material.flexural_stiffness[0] * length;
     Simulation run;
-    EXPECT_PETSC(run.setUp(scene, statics(4)));
-    TimeLoop loop(run.solver, statics(4));
-    bool finished = false;
-    EXPECT_PETSC(loop.run(
-        run.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
-    ASSERT_TRUE(finished) << loop.failure();
+    runTo(run, scene, statics(4));
     const Vec3 tip = rotationOf(run.state, run.elements->groups - 1).col(0);
     turn.push_back(std::atan2(tip[1], tip[0]) - exact);
     if (edges < 48) continue;
@@ -284,14 +250,7 @@ TEST(TendonsOnARod, HoldItWhereTheyPull) {
   scene.hostBodies();
   auto rested = [](const Scene &what) {
     Simulation run;
-    [&] { EXPECT_PETSC(run.setUp(what, statics(2))); }();
-    TimeLoop loop(run.solver, statics(2));
-    bool finished = false;
-    [&] {
-      EXPECT_PETSC(loop.run(
-          run.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
-    }();
-    EXPECT_TRUE(finished) << loop.failure();
+    runTo(run, what, statics(2));
     const Configuration c = configurationOf(run.state, run.scene, *run.elements, 1);
     return std::pair(run.state, what.tendons.empty() ? TendonReading()
                                                      : readTendon(run.scene, *run.elements, 0, run.state, c, false));
@@ -356,12 +315,7 @@ TEST(Winch, DrawsUpByItsRadius) {
   scene.hostBodies();
   Simulation run;
   LoopSettings settings = dynamics(0.01, 1);
-  EXPECT_PETSC(run.setUp(scene, settings));
-  TimeLoop loop(run.solver, settings);
-  bool finished = false;
-  EXPECT_PETSC(loop.run(
-      run.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
-  ASSERT_TRUE(finished) << loop.failure();
+  runTo(run, scene, settings);
   EXPECT_NEAR(angleOf(run, 0), 6 * pi, 1e-9);
   const double weight = run.scene.bodies[1].own.mass * 9.81;
   EXPECT_NEAR(run.state.body_position[1][1] + 0.4, 0.03 * 6 * pi - weight / 1e5, 1e-4);
@@ -380,25 +334,17 @@ TEST(Trees, HoldToRounding) {
   scene.bodies[2].angular_velocity = Vec3::Zero();
   Simulation run;
   const LoopSettings settings = dynamics(0.02, 2);
-  EXPECT_PETSC(run.setUp(scene, settings));
-  TimeLoop loop(run.solver, settings);
-  bool finished = false;
   double most = 0, farthest = 0;
-  EXPECT_PETSC(loop.run(
-      run.state,
-      [&](const State &, const Diagnostics &) {
-        const Configuration c = configurationOf(run.state, run.scene, *run.elements, run.state.time);
-        for (int k = 0; k < 3; ++k) {
-          const Joint &joint = run.scene.joints[std::size_t(k)];
-          const JointPlace place = placeOf(joint, run.elements->pairOf(k), *run.elements, c);
-          for (int row = 0; row < coordinate_row; ++row)
-            if (holds(joint, row)) most = std::max(most, std::abs(jointRow(joint, place, row).value));
-        }
-        farthest = std::max(farthest, std::abs(angleOf(run, 0)));
-        return PetscErrorCode(0);
-      },
-      &finished));
-  ASSERT_TRUE(finished) << loop.failure();
+  runAndWatch(run, scene, settings, [&](const Diagnostics &) {
+    const Configuration c = configurationOf(run.state, run.scene, *run.elements, run.state.time);
+    for (int k = 0; k < 3; ++k) {
+      const Joint &joint = run.scene.joints[std::size_t(k)];
+      const JointPlace place = placeOf(joint, run.elements->pairOf(k), *run.elements, c);
+      for (int row = 0; row < coordinate_row; ++row)
+        if (holds(joint, row)) most = std::max(most, std::abs(jointRow(joint, place, row).value));
+    }
+    farthest = std::max(farthest, std::abs(angleOf(run, 0)));
+  });
   EXPECT_GT(farthest, 0.9);
   EXPECT_LT(most, 1e-14);
 }

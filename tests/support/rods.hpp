@@ -77,19 +77,24 @@ inline LoopSettings dynamics(double dt, double t_end) {
   return s;
 }
 
-/// Runs a scene to its end; the test fails when a step does.
-inline void runTo(Simulation &sim, Scene scene, const LoopSettings &settings, int *iterations = nullptr) {
+/// Runs a scene to its end and calls visit(row of diagnostics) after each step; the test fails when a step does.
+template <class Visit> void runAndWatch(Simulation &sim, Scene scene, const LoopSettings &settings, Visit visit) {
   EXPECT_PETSC(sim.setUp(std::move(scene), settings));
   TimeLoop loop(sim.solver, settings);
   bool finished = false;
   EXPECT_PETSC(loop.run(
       sim.state,
       [&](const State &, const Diagnostics &row) {
-        if (iterations) *iterations += row.newton_iterations;
+        visit(row);
         return PetscErrorCode(0);
       },
       &finished));
   EXPECT_TRUE(finished) << loop.failure();
+}
+inline void runTo(Simulation &sim, Scene scene, const LoopSettings &settings, int *iterations = nullptr) {
+  runAndWatch(sim, std::move(scene), settings, [&](const Diagnostics &row) {
+    if (iterations) *iterations += row.newton_iterations;
+  });
 }
 
 /// Row of data/reference/<file> whose first column is `key`, by column names.

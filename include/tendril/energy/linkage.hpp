@@ -17,8 +17,8 @@ public:
   /// Whether a body beside a rod, or one that it is tied to, is in a tree.
   bool moves(int rod) const { return !hosts_.empty() && !hosts_[std::size_t(rod)].empty(); }
   /// The increments of a rod, as they are scaled, with those of bodies in trees and of what is tied to these.
-  /// \param from where targets are at the end of the step
-  void correct(const Configuration &from, const Planes &increment, double scale, int rod, Planes &out) const;
+  /// \param from where targets are at the end of the step \return by how much a body in these trees turns at most [rad]
+  double correct(const Configuration &from, const Planes &increment, double scale, int rod, Planes &out) const;
 
 private:
   /// \see BodyPair. `placed` is the child, or the parent.

@@ -146,6 +146,8 @@ public:
   /// How far rounding blurs the energy, beyond that of its value and of strains [J]. \param blur of an edge over its
   /// length
   virtual double noise(const Configuration & /*configuration*/, int /*rod*/, double /*blur*/) const { return 0; }
+  /// How far rounding blurs its forces on a rod and on the bodies beside it, beyond that of strains [N].
+  virtual double forceNoise(const Configuration & /*configuration*/, int /*rod*/) const { return 0; }
   /// Forces that are unknowns of their own, as they are at a trial: what the linearised constraints ask for.
   virtual void setTrialForces(const Configuration & /*iterate*/, const Planes & /*increment*/, double /*scale*/,
                               int /*rod*/, Configuration & /*trial*/) const {}

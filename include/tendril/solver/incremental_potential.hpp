@@ -216,8 +216,13 @@ public:
     for (const JoinedBody &b : elements_.bodies({rod, rod + 1}))
       includeBody(elements_, b, step_, start_, iterate_, gradient(rod).equilibrium, scales_[rod].force,
                   bodyLoad(scene_, elements_, b.body), &residual);
-    for (const auto &term : terms_)
+    double blurred = 0;
+    for (const auto &term : terms_) {
       residual.compatibility = std::max(residual.compatibility, term->mismatch(iterate_, rod));
+      blurred += term->forceNoise(iterate_, rod) / scales_[rod].force;
+    }
+    residual.force_floor = std::max(residual.force_floor, blurred);
+    residual.moment_floor = std::max(residual.moment_floor, blurred);
     return residual;
   }
   /// The largest of each over all rods.
