@@ -132,8 +132,13 @@ public:
     std::array<Vec3, 2> action{Vec3::Zero(), Vec3::Zero()};
     for (const int k : by_rod_.of(rod)) {
       const TendonPath &path = paths_[std::size_t(k)];
-      if (slot < path.slot() || slot >= path.slot() + path.tendon().slots()) continue;
       const double tension = pull(k, c).tension;
+      for (const Tendon::Pull &joint : path.tendon().joints)
+        if (elements_.pairOf(joint.joint).parent(0) == slot) {
+          const std::array<Vec3, 2> by = path.byParent(joint, c);
+          for (const std::size_t n : {0u, 1u}) action[n] += tension * by[n];
+        }
+      if (slot < path.slot() || slot >= path.slot() + path.tendon().slots()) continue;
       action[0] = slot == path.slot() ? Vec3(-tension, 0, 0)
                                       : Vec3(tension * path.byTold(c)[std::size_t(slot - path.slot() - 1)]);
     }

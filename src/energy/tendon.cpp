@@ -26,10 +26,11 @@ Pull muscleOf(const Actuator &a, double displacement, double pressure, const Ten
                length = a.muscle_length + displacement;
   auto tension = [&](double l) { return factor * (3 * l * l / square - 1) + damping * (l - rest); };
   auto potential = [&](double l) { return factor * muscleShape(a, l) + 0.5 * damping * (l - rest) * (l - rest); };
-  if (!(tension(length) > 0)) return {};
+  if (!(length > 0 && tension(length) > 0)) return {};
   // The longest length without tension: of a quadratic equation the root that is positive.
   const double lead = 3 * factor / square,
-               slack = lead > 0 ? (std::sqrt(damping * damping + 4 * lead * (factor + damping * rest)) - damping) /
+               slack = lead > 0 ? (std::sqrt(std::max(0.0, damping * damping + 4 * lead * (factor + damping * rest))) -
+                                   damping) /
                                       (2 * lead)
                                 : rest;
   return {potential(length) - potential(slack), tension(length), 2 * lead * length + damping};
@@ -311,6 +312,14 @@ std::vector<Vec3> TendonPath::byTold(const Configuration &c) const {
   return told;
 }
 
+std::array<Vec3, 2> TendonPath::byParent(const Tendon::Pull &pull, const Configuration &c) const {
+  const Joint &joint = scene_->joints[std::size_t(pull.joint)];
+  if (joint.parent >= 0) return {Vec3::Zero(), Vec3::Zero()};
+  const JointRow row =
+      jointRow(joint, tendril::placeOf(joint, elements_->pairOf(pull.joint), *elements_, c), coordinate_row);
+  return {Vec3(pull.coefficient * row.gradient.segment<3>(6)), Vec3(pull.coefficient * row.gradient.segment<3>(9))};
+}
+
 double TendonPath::rate(const State &state, const Configuration &c) const {
   const Derivatives d = derivatives(c, false);
   double sum = 0;
@@ -331,6 +340,12 @@ double TendonPath::rate(const State &state, const Configuration &c) const {
   auto next = by.begin();
   for (const Waypoint &p : tendon().points)
     if (p.isTold()) sum += next++->dot(p.motion.velocityAt(state.time));
+  for (const Tendon::Pull &pull : tendon().joints) {
+    const Motion &parent = scene_->joints[std::size_t(pull.joint)].motion;
+    const std::array<Vec3, 2> of = byParent(pull, c);
+    if (parent.moves())
+      sum += of[0].dot(parent.velocityAt(state.time)) + of[1].dot(parent.angularVelocityAt(state.time));
+  }
   return sum;
 }
 

@@ -35,8 +35,18 @@ HolderActions staticActions(const Scene &scene, const Elements &elements, const 
       const JointReading &of = actions.joint[h.index];
       if (h.drives)
         out.insert(out.end(), {Vec3(of.drive, 0, 0), Vec3::Zero()});
-      else
-        out.insert(out.end(), {of.force, of.moment});
+      else {
+        std::array<Vec3, 2> action{of.force, of.moment};
+        for (int k = 0; k < int(scene.tendons.size()); ++k) {
+          const TendonPath path(scene, elements, k);
+          for (const Tendon::Pull &pull : path.tendon().joints) {
+            if (pull.joint != h.index) continue;
+            const std::array<Vec3, 2> by = path.byParent(pull, c);
+            for (const std::size_t n : {0u, 1u}) action[n] += actions.tendon[std::size_t(k)].tension * by[n];
+          }
+        }
+        out.insert(out.end(), {action[0], action[1]});
+      }
     } else if (h.support)
       out.insert(out.end(), {actions.reaction[h.index], actions.reaction_moment[h.index]});
     else

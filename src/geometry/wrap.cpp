@@ -31,6 +31,7 @@ Winding windingOf(const Vec2 &p, const Vec2 &q, double radius, int side) {
   w.from = std::acos(std::min(radius / p.norm(), 1.0));
   w.to = std::acos(std::min(radius / q.norm(), 1.0));
   w.angle = between - w.from - w.to;
+  w.lost = w.lost || (side != 0 && -between > w.from + w.to); // straight it would go through
   return w;
 }
 

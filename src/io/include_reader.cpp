@@ -89,7 +89,10 @@ static double forceOf(const Scene &scene, const Body &body, double size) {
   double force = body.own.mass * scene.gravity.norm() + body.force.norm() + body.torque.norm() / size;
   for (const Joint &j : scene.joints) force = std::max(force, j.drive_stiffness / size);
   for (const Tendon &t : scene.tendons)
-    if (t.actuator.kind == Actuator::Kind::force) force = std::max(force, t.actuator.input);
+    if (t.actuator.kind == Actuator::Kind::force) {
+      force = std::max(force, t.actuator.input);
+      for (const Motion::Key &row : t.actuator.input_motion.table) force = std::max(force, row.displacement[0]);
+    }
   for (const Tendon &t : scene.tendons) // where nothing else is known
     if (force == 0) force = 1e-6 * size * stiffnessAsDrawn(t);
   return force > 0 ? force : body.own.mass * size;
@@ -141,6 +144,7 @@ void carryBodies(SceneFile &out) {
       const double size = std::sqrt(body.own.inertia.trace() / body.own.mass);
       Rod rod;
       rod.name = "carrier of " + body.name;
+      while (out.names.isTaken(rod.name)) rod.name += "'";
       rod.position = {body.position, body.position + Vec3(size, 0, 0)};
       rod.material = {1e-9 * body.own.mass / size, 0, 1e4 * forceOf(scene, body, size), 0, {0, 0}, 0, 0};
       rod.gravity = false;
@@ -191,7 +195,7 @@ void append(SceneFile part, const std::string &prefix, const YamlValue &where, S
       named(b.name);
       layered(b.layer);
       meet(b.contact);
-      b.rod += rods;
+      b.rod = from.rods.empty() ? 0 : b.rod + rods;
       if (out.body_numbers.count(b.name)) clash("a body", b.name);
     }
   for (const auto &[name, number] : part.body_numbers) out.body_numbers[prefix + name] = number + all_bodies;

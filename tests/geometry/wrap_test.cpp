@@ -96,6 +96,9 @@ TEST(Wrap, BeginsToWindWithoutAJump) {
   // Held to the other side it goes the long way; within the cylinder is none.
   EXPECT_GT(wayRoundCylinder(p, q, 0.4, 1).value, wayRoundCylinder(p, q, 0.4, -1).value + 0.1);
   EXPECT_EQ(wayRoundCylinder({0.1, 0, 0}, q, 0.4, 0).value, HUGE_VAL);
+  // By a side on which it would wind by more than three quarters of a turn it does not go straight through.
+  const double angle = 80 * pi / 180;
+  EXPECT_EQ(wayRoundCylinder({1.02, 0, 0}, {1.02 * std::cos(angle), 1.02 * std::sin(angle), 0}, 1, -1).value, HUGE_VAL);
   EXPECT_EQ(wayRoundSphere({0.1, 0, 0}, q, 0.4).value, HUGE_VAL);
   EXPECT_EQ(straightWay(Vec3::Zero()).value, HUGE_VAL);
 }

@@ -140,6 +140,39 @@ TEST(Finger, TakesTheWorkOfItsSlider) {
   }
 }
 
+/// What draws the coordinate of a joint whose parent turns as it is told does work by that turn, and reads its rate.
+TEST(Finger, FollowsAParentThatIsTold) {
+  Scene scene = finger(false, 0, 0);
+  scene.bodies.resize(1);
+  scene.joints.resize(1);
+  scene.joints[0].driven = false;
+  scene.joints[0].drive_stiffness = -1;
+  scene.joints[0].motion.angular_velocity = {0, 0, 1};
+  scene.tendons[0].points.clear();
+  scene.tendons[0].segments.clear();
+  scene.tendons[0].joints = {{0, 1.0}};
+  scene.tendons[0].actuator.stiffness = 0.5;
+  scene.tendons[0].actuator.compression = true;
+  scene.hostBodies();
+  Simulation run;
+  LoopSettings settings = dynamics(0.002, 0.5);
+  settings.integrator.name = "bdf2";
+  double work = 0, energy = 0, before = 0, rate = 0, most = 0, last_rate = 0;
+  runAndWatch(run, scene, settings, [&](const Diagnostics &row) {
+    work += row.work.total();
+    energy = row.energy.total();
+    const TendonReading t = readingOf(run, true);
+    rate = (t.displacement - before) / 0.002;
+    before = t.displacement;
+    most = std::max(most, std::abs(before));
+    last_rate = t.rate;
+  });
+  EXPECT_GT(energy, 1e-3);
+  EXPECT_LT(std::abs(work - energy), 0.02 * energy); // of steps of second order
+  EXPECT_GT(most, 0.05);
+  EXPECT_NEAR(last_rate, rate, 0.02 + 0.02 * std::abs(rate));
+}
+
 /// A tendon with a damper at its end, in methods of second order: no damping but its own.
 TEST(Finger, ConvergesAtTheOrderOfItsMethodWithADamper) {
   const OptionSet fine("-snes_rtol", "1e-10");

@@ -73,6 +73,17 @@ supports:
   EXPECT_EQ(file.source.files.size(), 1u); // one text, though it stands there twice
 }
 
+TEST(Include, GivesBodiesARodThatIsThere) {
+  const Folder folder;
+  folder.write("rod.yaml",
+               "rods:\n  - {name: a, line: {from: [0, 0, 0], to: [1, 0, 0], edges: 4}, material: default}\n");
+  folder.write("body.yaml", "bodies:\n  - {name: b, sphere: {radius: 0.1}, density: 1000}\n");
+  const SceneFile file =
+      readScene(folder.write("whole.yaml", "include:\n  - {file: rod.yaml}\n  - {file: body.yaml}\n"));
+  EXPECT_EQ(file.scene.rods.size(), 1u);
+  EXPECT_EQ(file.scene.bodies.at(0).rod, 0);
+}
+
 TEST(Include, RefusesWhatWouldNotEnd) {
   const Folder folder;
   folder.write("part.yaml", "include:\n  - {file: whole.yaml}\n");

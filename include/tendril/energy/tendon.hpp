@@ -61,6 +61,8 @@ public:
   std::vector<Vec3> drawn(const Configuration &c) const;
   /// Its displacement by the place of each point that is told, in their order.
   std::vector<Vec3> byTold(const Configuration &c) const;
+  /// Its displacement by moving and by turning the parent of a joint where that is told; zero of other joints.
+  std::array<Vec3, 2> byParent(const Tendon::Pull &pull, const Configuration &c) const;
   /// Rate of its displacement at a state [m/s].
   double rate(const State &state, const Configuration &c) const;
   double input(const Configuration &c) const { return c.positionAt(slot_)[0]; }
