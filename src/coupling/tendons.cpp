@@ -67,7 +67,9 @@ public:
     for (const int k : by_rod_.of(rod)) {
       const Work &w = work_[std::size_t(k)];
       const Pull p = pull(k, iterate);
-      const double now = tensionAt(k, p), wanted = p.tension + p.stiffness * motion(k, iterate, increment),
+      const double now = tensionAt(k, p),
+                   wanted =
+                       p.tension + (p.stiffness > 0 ? p.stiffness * motion(k, gradientOf(k, iterate), increment) : 0),
                    next = now + scale * (wanted - now);
       trial[Configuration::axial_force][paths_[std::size_t(k)].slot()] =
           (paths_[std::size_t(k)].tendon().actuator.compression ? next : std::max(next, 0.0)) - w.at_start;
@@ -118,9 +120,8 @@ public:
       const Pull p = pull(k, iterate);
       if (p.stiffness == 0) continue;
       const TendonPath &path = paths_[std::size_t(k)];
-      const Eigen::VectorXd by = path.derivatives(iterate, false).gradient;
-      const double excess =
-          path.displacement(trial) - path.displacement(iterate) - scale * motion(k, iterate, increment);
+      const Eigen::VectorXd by = gradientOf(k, iterate);
+      const double excess = path.displacement(trial) - path.displacement(iterate) - scale * motion(k, by, increment);
       if (!std::isfinite(excess)) continue;
       forVariables(path, [&](Eigen::Index v, int a, int slot) { force[a][slot] += p.stiffness * excess * by[v]; });
       most = std::max(most, std::abs(excess) / sizes_[std::size_t(k)]);
@@ -175,12 +176,13 @@ private:
         visit(Eigen::Index(Carrier::variables * c) + v, a, slot);
       }
   }
-  /// Of the displacement, to first order.
-  double motion(int k, const Configuration &c, const Planes &increment) const {
-    const TendonPath &path = paths_[std::size_t(k)];
-    const Eigen::VectorXd by = path.derivatives(c, false).gradient;
+  Eigen::VectorXd gradientOf(int k, const Configuration &c) const {
+    return paths_[std::size_t(k)].derivatives(c, false).gradient;
+  }
+  /// Of the displacement, to first order. \param by its gradient
+  double motion(int k, const Eigen::VectorXd &by, const Planes &increment) const {
     double sum = 0;
-    forVariables(path, [&](Eigen::Index v, int a, int slot) { sum += by[v] * increment[a][slot]; });
+    forVariables(paths_[std::size_t(k)], [&](Eigen::Index v, int a, int slot) { sum += by[v] * increment[a][slot]; });
     return sum;
   }
   /// One that pulls on one thing alone has that with itself, without entries: its rod goes as rods do that are joined.

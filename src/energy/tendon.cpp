@@ -170,13 +170,15 @@ double TendonPath::length(const Configuration &c) const {
   return sum;
 }
 
+/// The coordinate of its joint.
+static JointRow rowOf(const Scene &scene, const Elements &elements, const Tendon::Pull &pull, const Configuration &c) {
+  const Joint &joint = scene.joints[std::size_t(pull.joint)];
+  return jointRow(joint, placeOf(joint, elements.pairOf(pull.joint), elements, c), coordinate_row);
+}
+
 double TendonPath::coordinates(const Configuration &c) const {
   double sum = 0;
-  for (const Tendon::Pull &pull : tendon().joints) {
-    const Joint &joint = scene_->joints[std::size_t(pull.joint)];
-    sum += pull.coefficient *
-           jointRow(joint, tendril::placeOf(joint, elements_->pairOf(pull.joint), *elements_, c), coordinate_row).value;
-  }
+  for (const Tendon::Pull &pull : tendon().joints) sum += pull.coefficient * rowOf(*scene_, *elements_, pull, c).value;
   return sum;
 }
 
@@ -249,8 +251,7 @@ void TendonPath::addSegment(const Tendon::Segment &s, const Configuration &c, bo
 
 void TendonPath::addJoint(const Tendon::Pull &pull, const Configuration &c, bool second, Derivatives &out) const {
   const Joint &joint = scene_->joints[std::size_t(pull.joint)];
-  const JointRow row =
-      jointRow(joint, tendril::placeOf(joint, elements_->pairOf(pull.joint), *elements_, c), coordinate_row);
+  const JointRow row = rowOf(*scene_, *elements_, pull, c);
   std::array<int, 2> first{-1, -1};
   for (const int k : {0, 1})
     if (const int body = k == 0 ? joint.child : joint.parent; body >= 0)
@@ -313,10 +314,8 @@ std::vector<Vec3> TendonPath::byTold(const Configuration &c) const {
 }
 
 std::array<Vec3, 2> TendonPath::byParent(const Tendon::Pull &pull, const Configuration &c) const {
-  const Joint &joint = scene_->joints[std::size_t(pull.joint)];
-  if (joint.parent >= 0) return {Vec3::Zero(), Vec3::Zero()};
-  const JointRow row =
-      jointRow(joint, tendril::placeOf(joint, elements_->pairOf(pull.joint), *elements_, c), coordinate_row);
+  if (scene_->joints[std::size_t(pull.joint)].parent >= 0) return {Vec3::Zero(), Vec3::Zero()};
+  const JointRow row = rowOf(*scene_, *elements_, pull, c);
   return {Vec3(pull.coefficient * row.gradient.segment<3>(6)), Vec3(pull.coefficient * row.gradient.segment<3>(9))};
 }
 
@@ -342,9 +341,9 @@ double TendonPath::rate(const State &state, const Configuration &c) const {
     if (p.isTold()) sum += next++->dot(p.motion.velocityAt(state.time));
   for (const Tendon::Pull &pull : tendon().joints) {
     const Motion &parent = scene_->joints[std::size_t(pull.joint)].motion;
+    if (!parent.moves()) continue;
     const std::array<Vec3, 2> of = byParent(pull, c);
-    if (parent.moves())
-      sum += of[0].dot(parent.velocityAt(state.time)) + of[1].dot(parent.angularVelocityAt(state.time));
+    sum += of[0].dot(parent.velocityAt(state.time)) + of[1].dot(parent.angularVelocityAt(state.time));
   }
   return sum;
 }
