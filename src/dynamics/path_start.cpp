@@ -24,8 +24,7 @@ void requireDeadLoads(const Scene &scene) {
                        "' is moved, by its parent or its drive: -continuation arclength scales dead loads only; hold "
                        "it still or use -continuation load");
   for (const Tendon &t : scene.tendons)
-    if (t.actuator.input_motion.moves() ||
-        std::any_of(t.points.begin(), t.points.end(), [](const Waypoint &p) { return p.motion.moves(); }))
+    if (t.isMoved())
       throw SceneError("tendon '" + t.name +
                        "' is given a table, or a point of it moves: -continuation arclength scales dead loads only; "
                        "hold it still or use -continuation load");

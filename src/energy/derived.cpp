@@ -107,8 +107,6 @@ RodActions rodActions(const Scene &scene, const Elements &elements, const State 
     out.constraint.push_back(readConstraint(scene, elements, int(k), state, c, dynamic));
   for (std::size_t k = 0; k < scene.joints.size(); ++k)
     out.joint.push_back(readJoint(scene, elements, int(k), state, c, dynamic));
-  for (std::size_t k = 0; k < scene.tendons.size(); ++k)
-    out.tendon.push_back(readTendon(scene, elements, int(k), state, c, dynamic));
   // A couple acts by a pair of forces on the ends of its edge, which is not a force in the rod.
   for (const EdgeMoment &m : scene.moments) {
     const int i = elements.rods[m.rod].first_edge + m.edge;

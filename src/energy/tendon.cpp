@@ -67,11 +67,9 @@ double workBetween(const Actuator &a, double from, double to, double input) {
 
 double stiffnessAsDrawn(const Tendon &tendon) {
   const Actuator &a = tendon.actuator;
-  double most = a.input;
-  for (const Motion::Key &row : a.input_motion.table) most = std::max(most, row.displacement[0]);
   if (a.kind == Actuator::Kind::displacement) return a.stiffness;
   if (a.kind != Actuator::Kind::mckibben) return 0;
-  return 6 * muscleFactor(a, most) * a.muscle_length / (a.braid_length * a.braid_length);
+  return 6 * muscleFactor(a, a.largestInput()) * a.muscle_length / (a.braid_length * a.braid_length);
 }
 
 Vec3 asDrawn(const Scene &scene, const Waypoint &p) {
@@ -81,9 +79,8 @@ Vec3 asDrawn(const Scene &scene, const Waypoint &p) {
   return rod.position[std::size_t(p.edge)] + p.at * rod.edge(p.edge) + matrixOf(frame) * p.point;
 }
 
-/// Its length by both ends from the centre, in the axes of the world. \param axes of the cylinder, as columns
-static WayLength wayRound(const Wrap &wrap, const Mat3 &axes, const Vec3 &from, const Vec3 &to) {
-  const Vec3 p = axes.transpose() * from, q = axes.transpose() * to;
+/// Its length by both ends, in the axes of the world. \param p, q the ends in the axes of the cylinder or sphere
+static WayLength wayRound(const Wrap &wrap, const Mat3 &axes, const Vec3 &p, const Vec3 &q) {
   WayLength way = wrap.sphere ? wayRoundSphere(p, q, wrap.radius) : wayRoundCylinder(p, q, wrap.radius, wrap.side);
   for (const int a : {0, 3}) {
     way.gradient.segment<3>(a) = axes * way.gradient.segment<3>(a);
@@ -105,7 +102,8 @@ double segmentAsDrawn(const Scene &scene, const Tendon &tendon, const Tendon::Se
              to = asDrawn(scene, tendon.points[std::size_t(s.to)]);
   if (s.wrap < 0) return (to - from).norm();
   const Wrap &wrap = tendon.wraps[std::size_t(s.wrap)];
-  return wayRound(wrap, axesAsDrawn(wrap), from - wrap.centre, to - wrap.centre).value;
+  const Mat3 axes = axesAsDrawn(wrap);
+  return wayRound(wrap, axes, axes.transpose() * (from - wrap.centre), axes.transpose() * (to - wrap.centre)).value;
 }
 
 TendonPath::TendonPath(const Scene &scene, const Elements &elements, int index)
@@ -151,17 +149,23 @@ TendonPath::Place TendonPath::placeOf(const Carried &p, const Configuration &c) 
   return place;
 }
 
-Mat3 TendonPath::axesOf(const Round &round, const Configuration &c) const {
-  if (round.centre.carrier < 0) return round.axes;
-  return c.rotationAt(carriers_[std::size_t(round.centre.carrier)].slot[1]) * round.axes;
+TendonPath::Seen TendonPath::seen(const Tendon::Segment &s, const Configuration &c) const {
+  const Round &round = rounds_[std::size_t(s.wrap)];
+  const int carrier = round.centre.carrier;
+  Seen seen{tendon().wraps[std::size_t(s.wrap)],
+            carrier < 0 ? round.axes : Mat3(c.rotationAt(carriers_[std::size_t(carrier)].slot[1]) * round.axes),
+            placeOf(round.centre, c),
+            {}};
+  for (const std::size_t k : {0u, 1u})
+    seen.end[k] = seen.axes.transpose() * placeOf(points_[std::size_t(k == 0 ? s.from : s.to)], c).from(seen.centre);
+  return seen;
 }
 
 WayLength TendonPath::wayOf(const Tendon::Segment &s, const Configuration &c) const {
-  const Place from = placeOf(points_[std::size_t(s.from)], c), to = placeOf(points_[std::size_t(s.to)], c);
-  if (s.wrap < 0) return straightWay(to.from(from));
-  const Round &round = rounds_[std::size_t(s.wrap)];
-  const Place centre = placeOf(round.centre, c);
-  return wayRound(tendon().wraps[std::size_t(s.wrap)], axesOf(round, c), from.from(centre), to.from(centre));
+  if (s.wrap < 0)
+    return straightWay(placeOf(points_[std::size_t(s.to)], c).from(placeOf(points_[std::size_t(s.from)], c)));
+  const Seen round = seen(s, c);
+  return wayRound(round.wrap, round.axes, round.end[0], round.end[1]);
 }
 
 double TendonPath::length(const Configuration &c) const {
@@ -284,12 +288,9 @@ std::vector<Vec3> TendonPath::drawn(const Configuration &c) const {
     all.push_back(at[k]);
     for (const Tendon::Segment &s : tendon().segments) {
       if (s.from != int(k) || s.wrap < 0) continue;
-      const Wrap &wrap = tendon().wraps[std::size_t(s.wrap)];
-      const Round &round = rounds_[std::size_t(s.wrap)];
-      const Mat3 axes = axesOf(round, c);
-      const Place place = placeOf(round.centre, c);
-      const Vec3 centre = place.high + place.low, p = axes.transpose() * (at[k] - centre),
-                 q = axes.transpose() * (at[std::size_t(s.to)] - centre);
+      const auto [wrap, axes, place, end] = seen(s, c);
+      const auto &[p, q] = end;
+      const Vec3 centre = place.high + place.low;
       constexpr int between = Tendon::drawn_points;
       const std::vector<Vec3> on = wrap.sphere ? drawnRoundSphere(p, q, wrap.radius, between)
                                                : drawnRoundCylinder(p, q, wrap.radius, wrap.side, between);
@@ -352,13 +353,9 @@ double TendonPath::clearance(const Configuration &c) const {
   double least = HUGE_VAL;
   for (const Tendon::Segment &s : tendon().segments) {
     if (s.wrap < 0) continue;
-    const Wrap &wrap = tendon().wraps[std::size_t(s.wrap)];
-    const Round &round = rounds_[std::size_t(s.wrap)];
-    for (const int point : {s.from, s.to}) {
-      Vec3 arm = axesOf(round, c).transpose() * placeOf(points_[std::size_t(point)], c).from(placeOf(round.centre, c));
-      if (!wrap.sphere) arm[2] = 0;
-      least = std::min(least, arm.norm() / wrap.radius - 1);
-    }
+    const Seen round = seen(s, c);
+    for (const Vec3 &arm : round.end)
+      least = std::min(least, (round.wrap.sphere ? arm.norm() : arm.head<2>().norm()) / round.wrap.radius - 1);
   }
   return least;
 }

@@ -89,10 +89,7 @@ static double forceOf(const Scene &scene, const Body &body, double size) {
   double force = body.own.mass * scene.gravity.norm() + body.force.norm() + body.torque.norm() / size;
   for (const Joint &j : scene.joints) force = std::max(force, j.drive_stiffness / size);
   for (const Tendon &t : scene.tendons)
-    if (t.actuator.kind == Actuator::Kind::force) {
-      force = std::max(force, t.actuator.input);
-      for (const Motion::Key &row : t.actuator.input_motion.table) force = std::max(force, row.displacement[0]);
-    }
+    if (t.actuator.kind == Actuator::Kind::force) force = std::max(force, t.actuator.largestInput());
   for (const Tendon &t : scene.tendons) // where nothing else is known
     if (force == 0) force = 1e-6 * size * stiffnessAsDrawn(t);
   return force > 0 ? force : body.own.mass * size;

@@ -1,5 +1,6 @@
 #include "tendril/io/trajectory.hpp"
 
+#include "tendril/energy/tendon.hpp"
 #include "tendril/io/trajectory_fields.hpp"
 #include "tendril/io/xdmf.hpp"
 

@@ -19,12 +19,8 @@ SupportMotion::SupportMotion(const Scene &scene, const DofMap &dofs, const Eleme
     }
   for (std::size_t k = 0; k < scene.joints.size(); ++k)
     if (scene.joints[k].motion.moves() || scene.joints[k].target_motion.moves()) moving_joints_.push_back(int(k));
-  for (std::size_t k = 0; k < scene.tendons.size(); ++k) {
-    const Tendon &t = scene.tendons[k];
-    if (t.actuator.input_motion.moves() ||
-        std::any_of(t.points.begin(), t.points.end(), [](const Waypoint &p) { return p.motion.moves(); }))
-      moving_tendons_.push_back(int(k));
-  }
+  for (std::size_t k = 0; k < scene.tendons.size(); ++k)
+    if (scene.tendons[k].isMoved()) moving_tendons_.push_back(int(k));
 }
 
 void SupportMotion::turn(const Configuration &from, double from_time, double to_time) {

@@ -5,7 +5,6 @@
 
 #include "tendril/energy/constraint.hpp"
 #include "tendril/energy/joint.hpp"
-#include "tendril/energy/tendon.hpp"
 
 namespace tendril {
 
@@ -36,7 +35,6 @@ struct RodActions {
   std::vector<Vec3> reaction_moment;
   std::vector<ConstraintReading> constraint; ///< (nc)
   std::vector<JointReading> joint;           ///< (nj)
-  std::vector<TendonReading> tendon;         ///< (nt)
   /// (na) What rods do to bodies where they are tied exactly, the moment about the vertex [N], [N m].
   std::vector<Vec3> attachment, attachment_moment;
 };

@@ -96,7 +96,14 @@ private:
 
   int numberOf(const Carrier &carrier);
   Place placeOf(const Carried &point, const Configuration &c) const;
-  Mat3 axesOf(const Round &round, const Configuration &c) const;
+  /// What a segment winds round, and both its ends as that sees them.
+  struct Seen {
+    const Wrap &wrap;
+    Mat3 axes; ///< its own, as columns
+    Place centre;
+    std::array<Vec3, 2> end; ///< from the centre, in its axes [m]
+  };
+  Seen seen(const Tendon::Segment &segment, const Configuration &c) const;
   double coordinates(const Configuration &c) const;
   /// Of a segment, by the places of its ends as what it winds round sees them, in the axes of the world.
   WayLength wayOf(const Tendon::Segment &segment, const Configuration &c) const;

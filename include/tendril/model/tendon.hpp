@@ -5,6 +5,8 @@
 
 #include "tendril/model/motion.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,6 +29,11 @@ struct Actuator {
   /// below which it does nothing [m], [m], -, [Pa].
   double muscle_length = 0, braid_length = 0, turns = 0, minimum_pressure = 0;
 
+  double largestInput() const {
+    double most = input_motion.table.empty() ? input : -HUGE_VAL;
+    for (const Motion::Key &row : input_motion.table) most = std::max(most, row.displacement[0]);
+    return most;
+  }
   double inputAt(double time) const {
     return input_motion.table.empty() ? input : input_motion.displacementAt(time)[0];
   }
@@ -98,6 +105,11 @@ struct Tendon {
     return count;
   }
   bool dissipates() const { return actuator.damping > 0; }
+  /// Whether its actuator is given a table, or points of it move as they are told.
+  bool isMoved() const {
+    return actuator.input_motion.moves() ||
+           std::any_of(points.begin(), points.end(), [](const Waypoint &p) { return p.motion.moves(); });
+  }
 };
 
 } // namespace tendril
