@@ -28,6 +28,7 @@ struct Request {
   PetscInt edges = 400, rods = 1, steps = 20, repeats = 5;
   PetscReal dt = 0; ///< [s]; 0: of the scene
   std::string scene, csv;
+  PetscInt model = PetscInt(RodModel::full);
 };
 
 PetscErrorCode readRequest(Request *r) {
@@ -43,6 +44,9 @@ PetscErrorCode readRequest(Request *r) {
                                  r->repeats, &r->repeats, nullptr, 1, 1000));
   PetscCall(PetscOptionsReal("-dt", "time step, 0: that of the scene, or 0.005 [s]", "", r->dt, &r->dt, nullptr));
   PetscCall(PetscOptionsString("-bench_csv", "file to which the row is added", "", csv, csv, sizeof csv, nullptr));
+  PetscCall(PetscOptionsEList("-model", "unknowns of all rods; torsion_free: without rotational inertia", "",
+                              rod_model_names, std::size(rod_model_names), rod_model_names[r->model], &r->model,
+                              nullptr));
   PetscOptionsEnd();
   for (const char *size : {"-bench_edges", "-bench_rods"}) {
     PetscBool given;
@@ -146,6 +150,13 @@ PetscErrorCode makeScene(const Request &request, Scene *scene, LoopSettings *set
     *scene = std::move(file.scene);
     settings->dt = file.run.dt;
   }
+  for (Rod &rod : scene->rods) {
+    rod.model = RodModel(request.model);
+    if (rod.model == RodModel::cable) rod.material.flexural_stiffness = {0, 0};
+    if (rod.model == RodModel::torsion_free) rod.material.linear_rotational_inertia = 0;
+  }
+  std::vector<std::string> notes;
+  settleModels(*scene, true, true, &notes);
   if (request.dt < 0) throw SceneError("option -dt: must be greater than zero");
   if (request.dt > 0) settings->dt = request.dt;
   settings->t_end = settings->dt * double(request.steps);

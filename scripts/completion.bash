@@ -8,6 +8,7 @@ _tendril() {
     -dt_adapt) COMPREPLY=($(compgen -W 'none error' -- "$word"));;
     -continuation) COMPREPLY=($(compgen -W 'load arclength' -- "$word"));;
     -bifurcation) COMPREPLY=($(compgen -W 'off locate stop switch' -- "$word"));;
+    -model) COMPREPLY=($(compgen -W 'full torsion_free planar cable auto' -- "$word"));;
     -stretch) COMPREPLY=($(compgen -W 'primal mixed' -- "$word"));;
     -retraction) COMPREPLY=($(compgen -W 'additive length' -- "$word"));;
     -hessian) COMPREPLY=($(compgen -W 'exact gauss_newton' -- "$word"));;
@@ -17,7 +18,7 @@ _tendril() {
     -rod_measure) COMPREPLY=($(compgen -W 'tan angle' -- "$word"));;
     -rod_energy) COMPREPLY=($(compgen -W 'seed classical' -- "$word"));;
     -scene|-restart|-output_dir|-output_shapes|-options_file) COMPREPLY=($(compgen -f -- "$word"));;
-    *) COMPREPLY=($(compgen -W '-scene -gravity -restart -restart_time -schema -keys -mode -dt -t_end -time_limit -integrator -rho_inf -dt_adapt -dt_rtol -dt_atol -dt_max -dt_min -load_steps -continuation -arclength_steps -bifurcation -snes_rtol -snes_max_it -rounding_tolerance -stretch -retraction -hessian -line_search -partition -quasi_newton -rod_edges -contact_stiffness -contact_distance -contact_friction -error_estimate -accuracy -accuracy_of -output_dir -output_shapes -output_interval -checkpoint_interval -output_fields -rod_measure -rod_energy -rod_radius -rod_radii -rod_width -rod_height -rod_young -rod_poisson -rod_shear -rod_density -rod_linear_density -rod_linear_rotational_inertia -rod_axial_stiffness -rod_torsional_stiffness -rod_flexural_stiffness -rod_mass_damping_coefficient -rod_stiffness_damping_coefficient -help' -- "$word"));;
+    *) COMPREPLY=($(compgen -W '-scene -gravity -restart -restart_time -schema -keys -mode -dt -t_end -time_limit -integrator -rho_inf -dt_adapt -dt_rtol -dt_atol -dt_max -dt_min -load_steps -continuation -arclength_steps -bifurcation -snes_rtol -snes_max_it -rounding_tolerance -model -model_check -stretch -retraction -hessian -line_search -partition -quasi_newton -rod_edges -contact_stiffness -contact_distance -contact_friction -error_estimate -accuracy -accuracy_of -output_dir -output_shapes -output_interval -checkpoint_interval -output_fields -rod_measure -rod_energy -rod_radius -rod_radii -rod_width -rod_height -rod_young -rod_poisson -rod_shear -rod_density -rod_linear_density -rod_linear_rotational_inertia -rod_axial_stiffness -rod_torsional_stiffness -rod_flexural_stiffness -rod_mass_damping_coefficient -rod_stiffness_damping_coefficient -help' -- "$word"));;
   esac
 }
 complete -o filenames -F _tendril tendril build/bin/tendril

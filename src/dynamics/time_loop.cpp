@@ -249,6 +249,16 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
       next = state;
       continue;
     }
+    if (widen && step.report.converged && !step.too_coarse) {
+      bool widened = false;
+      PetscCall(widen(next, step.report.first_negative_pivots > 0, &widened));
+      if (widened) {
+        if (begun_here) control.energy = NAN;
+        prepare(state);
+        next = state;
+        continue;
+      }
+    }
     if (!step.too_coarse && mayPassCritical(state, step.report)) {
       bool moved = false;
       const State before = state;

@@ -15,7 +15,7 @@ public:
   /// (r + q s)/(1 + q).
   void beginStep(const State &, const Configuration &start, const Step &step, int r) override {
     const double beta = scene_.rods[r].material.stiffness_damping_coefficient;
-    if (beta == 0) return;
+    if (beta == 0 || elements_.rods[r].isReduced()) return;
     const double q = step.isStatic() ? 0 : beta / step.dampingDt();
     forCells(elements_, r, [&]<class T>(const LooseCell &cell, int count) {
       const std::array<T, 3> s = presentStrain<T>(elements_, start, r, cell, count);
@@ -31,6 +31,7 @@ public:
   }
 
   double energy(const Configuration &configuration, int rod) const override {
+    if (elements_.rods[rod].isReduced()) return 0; // see bend.cpp
     return elements_.measure[rod] == Measure::tan ? total<Measure::tan>(configuration, rod)
                                                   : total<Measure::angle>(configuration, rod);
   }
@@ -66,6 +67,7 @@ public:
 
   void addDerivatives(const Configuration &configuration, int rod, Derivatives &out,
                       HessianKind hessian) const override {
+    if (elements_.rods[rod].isReduced()) return;
     elements_.measure[rod] == Measure::tan ? assemble<Measure::tan>(configuration, rod, hessian, out)
                                            : assemble<Measure::angle>(configuration, rod, hessian, out);
   }

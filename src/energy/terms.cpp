@@ -11,6 +11,8 @@ std::vector<std::unique_ptr<Term>> makeRodTerms(const Scene &scene, const Elemen
                      std::any_of(scene.rods.begin(), scene.rods.end(), [](const Rod &r) { return r.gravity; });
   terms.push_back(makeStretch(elements, axial));
   if (!elements.cell_slot.empty()) terms.push_back(makeBendTwist(scene, elements));
+  if (std::any_of(elements.rods.begin(), elements.rods.end(), [](const RodRange &r) { return r.isReduced(); }))
+    terms.push_back(makeBend(scene, elements));
   if (heavy || !scene.rotation.angular_velocity.isZero(0) || !scene.forces.empty() || !scene.moments.empty())
     terms.push_back(makeLoad(scene, elements));
   if (dynamic) terms.push_back(makeInertia(scene, elements));

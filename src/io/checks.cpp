@@ -135,6 +135,9 @@ void refuseWithRodContact(const Scene &scene, const Options &o) {
 } // namespace
 
 void checkScene(const Scene &scene, const Options &o, std::vector<std::string> *notes) {
+  if (o.model_check && (!o.restart.empty() || (!o.loop.dynamic && o.loop.continuation == Continuation::arclength)))
+    throw SceneError("option -model_check: runs the scene again from its start, in steps of time or load; take "
+                     "-restart and -continuation arclength away");
   if (!o.loop.dynamic) requireHeld(scene);
   if (o.loop.dynamic && !scene.rotation.angular_velocity.isZero(0))
     throw SceneError("scene key 'rotation': is for -mode static, a scene at rest in a frame that turns; in dynamics "

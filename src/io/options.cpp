@@ -258,9 +258,11 @@ void readSolver(Texts &texts, Options *o) {
   o->loop.hessian = texts.word("-hessian") == "exact" ? HessianKind::exact : HessianKind::gauss_newton;
 }
 
-void readContact(const Texts &texts, Options *o) {
-  using Number = KeyOf<KeyType::number>;
-  for (const Number key : {Number("-contact_stiffness"), Number("-contact_distance"), Number("-contact_friction")})
+void readOverrides(const Texts &texts, Options *o) {
+  if (texts.isGiven("-model")) o->overrides["model"] = texts.word("-model");
+  o->model_check = texts.flag("-model_check");
+  for (const auto key :
+       std::initializer_list<KeyOf<KeyType::number>>{"-contact_stiffness", "-contact_distance", "-contact_friction"})
     if (texts.isGiven(key->path) && std::isfinite(texts.number(key))) // what is no number is told here
       o->overrides[std::string(key->name())] = texts.text(*key);
 }
@@ -299,7 +301,7 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   readAccuracy(texts, o);
   readSolver(texts, o);
   readMaterial(texts, o);
-  readContact(texts, o);
+  readOverrides(texts, o);
   PetscCall(refuseUnsuited());
   texts.number("-snes_rtol"); // PETSc reads them, with less to say about mistakes
   texts.integer("-snes_max_it");
@@ -307,8 +309,6 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
 }
 
 namespace {
-
-/// Of estimates and the choice of edges.
 void checkAccuracy(const Options &o) {
   if (o.accuracy_of && !o.accuracy) fail("accuracy_of", "needs -accuracy, e.g. -accuracy 1e-3");
   if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength && (o.accuracy || o.error_estimate))

@@ -75,6 +75,7 @@ private:
     if (!o.restart.empty()) put("restart", o.restart);
     list("output_fields", o.fields.begin(), o.fields.end());
     put("error_estimate", o.error_estimate);
+    put("model_check", o.model_check);
     if (o.accuracy) {
       put("accuracy", o.accuracy->tolerance);
       put("accuracy_of", o.accuracy->of == Quantity::tip      ? "tip"

@@ -1,5 +1,6 @@
 #include "tendril/io/prepare.hpp"
 
+#include "tendril/dynamics/plane_watch.hpp"
 #include "tendril/io/checks.hpp"
 #include "tendril/io/quiet_errors.hpp"
 #include "tendril/io/text.hpp"
@@ -91,6 +92,9 @@ static Scene sceneFor(Prepared &prepared, Options &o) {
   prepared.notes = std::move(file.notes);
   if (o.gravity) file.scene.gravity = *o.gravity;
   resolve(file.run, o);
+  settleModels(file.scene, o.loop.dynamic,
+               Team::world().isAlone() && (o.loop.dynamic || o.loop.continuation == Continuation::load),
+               &prepared.notes);
   checkScene(file.scene, o, &prepared.notes);
   if (o.accuracy || (o.error_estimate && !o.loop.dynamic)) {
     prepared.written = file.scene;
@@ -119,6 +123,15 @@ PetscErrorCode unite(Prepared &prepared, const Options &o, std::string *line) {
   text << "ranks: rods or bodies of different ones come near each other: " << parts.ranks << " of " << before
        << " go on, " << parts.least << " to " << parts.most << " edges a rank";
   *line = text.str();
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode leavePlanes(Prepared &prepared, const Options &o) {
+  PetscFunctionBeginUser;
+  Simulation &run = *prepared.run;
+  State state = std::move(run.state);
+  PetscCall(run.setUp(freeOfPlanes(run.scene), o.loop));
+  run.state = std::move(state);
   PetscFunctionReturn(0);
 }
 

@@ -50,6 +50,7 @@ std::string groupsText(const Scene &scene) {
   for (std::size_t r = 0; r < shown; ++r) {
     const DimensionlessGroups g = dimensionlessGroups(scene.rods[r], scene.gravity, corners[r]);
     s << "rod '" << scene.rods[r].name << "': " << scene.rods[r].edges() << " edges, length " << g.length << " m";
+    if (scene.rods[r].bends() && scene.rods[r].model != RodModel::full) s << ", model " << nameOf(scene.rods[r].model);
     if (scene.rods[r].material.isCable())
       s << ", a cable\n";
     else

@@ -220,6 +220,12 @@ void readRod(const YamlValue &value, const Overrides &overrides, SceneFile &out,
     const auto o = overrides.find(name);
     return o == overrides.end() ? written : YamlValue(YAML::Node(o->second), "option -rod_" + name, name).word(*key);
   };
+  const std::string model = word("rods[].model");
+  common.chooses_model = model == "auto";
+  for (const RodModel m : {RodModel::cable, RodModel::planar, RodModel::torsion_free})
+    if (model == nameOf(m)) common.model = m;
+  if (common.model == RodModel::cable)
+    common.left_out = std::exchange(common.material.flexural_stiffness, std::array{0.0, 0.0});
   common.measure = word("rods[].measure") == "tan" ? Measure::tan : Measure::angle;
   common.energy = word("rods[].energy") == "seed" ? Energy::seed : Energy::classical;
   common.gravity = map.flag("rods[].gravity");

@@ -16,6 +16,7 @@
 #include "tendril/io/stop.hpp"
 #include "tendril/io/take_up.hpp"
 #include "tendril/io/text.hpp"
+#include "tendril/io/watch_models.hpp"
 #include "tendril/layout/launch.hpp"
 #include "tendril/solver/activity.hpp"
 #include "tendril/solver/events.hpp"
@@ -138,6 +139,7 @@ PetscErrorCode march(Prepared &prepared, TimeLoop &loop, const Options &o, const
       if (*stays) progress.say(line);
       PetscFunctionReturn(0);
     };
+    PetscCall(watchModels(prepared, o, progress, loop));
     PetscCall(loop.run(run.state, observe, finished));
     *failure = loop.failure();
   }
@@ -243,6 +245,7 @@ PetscErrorCode runPrepared(Prepared &prepared, int argc, char **argv, const Opti
     *exit_code = 2;
   }
   recorder.close();
+  if (finished && o.model_check) PetscCall(proveModels(prepared, o, recorder.last().wall_seconds, progress, exit_code));
   if (finished && o.error_estimate && o.loop.dynamic) tellTimeError(recorder.last(), o, progress);
   if (finished && o.error_estimate && !o.loop.dynamic)
     PetscCall(tellError(prepared, recorder.last().rounding_error, recorder.criticalFactors(), o, progress));

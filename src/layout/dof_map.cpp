@@ -61,6 +61,7 @@ PetscErrorCode DofMap::createSection(PetscSection *section) const {
   }
   PetscCall(PetscSectionSetChart(*section, 0, points));
   PetscInt point = 0;
+  std::unordered_map<PetscInt, PetscInt> flat; // coordinates of vertices that are no unknowns
   const std::vector<bool> fixed = withoutUnknowns(held_, rods_, joined_vertices_.items);
   for (int r = 0; r < int(rods_.size()); ++r) {
     for (int i = 0; i < rods_[r].vertices; ++i) {
@@ -70,6 +71,10 @@ PetscErrorCode DofMap::createSection(PetscSection *section) const {
       if (fixed[rods_[r].first_vertex + i]) {
         PetscCall(PetscSectionSetConstraintDof(*section, vertex, 3));
         PetscCall(PetscSectionSetFieldConstraintDof(*section, vertex, 0, 3));
+      } else if (rods_[r].flat >= 0) {
+        flat[vertex] = rods_[r].flat;
+        PetscCall(PetscSectionSetConstraintDof(*section, vertex, 1));
+        PetscCall(PetscSectionSetFieldConstraintDof(*section, vertex, 0, 1));
       }
       if (i == rods_[r].edges) continue;
       const PetscInt edge = point++;
@@ -94,8 +99,9 @@ PetscErrorCode DofMap::createSection(PetscSection *section) const {
     PetscInt constrained;
     PetscCall(PetscSectionGetConstraintDof(*section, p, &constrained));
     if (constrained == 0) continue;
-    PetscCall(PetscSectionSetConstraintIndices(*section, p, all));
-    PetscCall(PetscSectionSetFieldConstraintIndices(*section, p, 0, all));
+    const PetscInt *which = constrained == 1 ? &flat.at(p) : all;
+    PetscCall(PetscSectionSetConstraintIndices(*section, p, which));
+    PetscCall(PetscSectionSetFieldConstraintIndices(*section, p, 0, which));
   }
   PetscFunctionReturn(0);
 }
@@ -135,8 +141,8 @@ void DofMap::layOut(const Scene &scene) {
     // A pack between the slots behind the last vertex and what follows, so that no pack holds parts of both; and a slot
     // before the next rod.
     const int slots = Planes::planeStride(rod.vertices() + RodRange::behind + along[r] + 1);
-    rods_.push_back(
-        {vertices_, rod.vertices(), edges_, rod.edges(), slots_, slots, !rod.material.isCable(), rod.closed});
+    rods_.push_back({vertices_, rod.vertices(), edges_, rod.edges(), slots_, slots, rod.twists(), rod.closed,
+                     rod.bends(), rod.flat});
     vertices_ += rod.vertices();
     edges_ += rod.edges();
     slots_ += slots;
@@ -175,7 +181,8 @@ PetscErrorCode DofMap::setUp(const Scene &scene) {
       PetscInt offset;
       PetscCall(PetscSectionGetOffset(global, point++, &offset));
       if (!fixed[rod.first_vertex + i])
-        for (int a = 0; a < 3; ++a) here[a] = offset + a;
+        for (int a = 0; a < 3; ++a)
+          if (rod.has(a)) here[a] = offset++;
       if (i == rod.edges) continue;
       if (rod.twist) {
         PetscCall(PetscSectionGetOffset(global, point, &offset));

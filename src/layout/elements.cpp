@@ -210,7 +210,7 @@ Elements::Elements(const Scene &scene, const DofMap &dofs)
       mass[range.slot(rod.next(i))] += 0.5 * rod.material.linear_density * length;
     }
     for (const int k : forcesOf(int(r))) mass[range.slot(scene.forces[k].vertex)] += scene.forces[k].mass;
-    if (range.twist) {
+    if (range.bends) {
       CellBuilder builder(scene, int(r), *this);
       builder.build();
       if (!scene.moments.empty()) builder.addEndCouples(scene, int(r));

@@ -290,6 +290,8 @@ Scene remesh(const Scene &written, const std::vector<Drawing> &drawings, const s
     scene.rods.push_back(isRemeshed(written.rods[r], drawings[r], edges[r])
                              ? remeshed(written.rods[r], drawings[r], edges[r])
                              : written.rods[r]);
+  for (Rod &rod : scene.rods)
+    if (rod.flat >= 0) flatten(rod);
   for (const Support &support : written.supports) {
     Support &s = scene.supports.emplace_back(support);
     const Rod &rod = scene.rods[s.rod];

@@ -2,6 +2,7 @@
 
 #include "tendril/solver/elimination.hpp"
 #include "tendril/solver/factor_type.hpp"
+#include "tendril/solver/reduced_elimination.hpp"
 #include "tendril/solver/substitution.hpp"
 
 #include <algorithm>
@@ -13,6 +14,25 @@ namespace {
 
 template <class T> T *as(double *p) { return reinterpret_cast<T *>(p); }
 template <class T> const T *as(const double *p) { return reinterpret_cast<const T *>(p); }
+
+/// Calls visit with the shape of a rod without twists.
+template <class Visit> auto withShape(const RodRange &rod, const Visit &visit) {
+  switch (rod.flat) {
+  case 0:
+    return visit(ReducedShape<true, 0>());
+  case 1:
+    return visit(ReducedShape<true, 1>());
+  case 2:
+    return visit(ReducedShape<true, 2>());
+  default:
+    return rod.bends ? visit(ReducedShape<true>()) : visit(ReducedShape<false>());
+  }
+}
+
+/// Numbers that the factor of an edge takes.
+template <class T> std::size_t perEdge(const RodRange &rod, bool reduced) {
+  return reduced ? withShape(rod, [](auto shape) { return std::size_t(shape.record); }) : Record<T>::of(rod);
+}
 
 } // namespace
 
@@ -47,7 +67,9 @@ BandedFactor::BandedFactor(const DofMap &dofs, RodSet set, BandedWorkspace &work
   }
   std::iota(order_.begin(), order_.end(), set.begin);
   // Slots, too: planes of blocks are so far apart.
-  auto shape = [&](int r) { return std::tuple(rods[r].vertices, rods[r].slots, rods[r].closed, rods[r].twist); };
+  auto shape = [&](int r) {
+    return std::tuple(rods[r].vertices, rods[r].slots, rods[r].closed, rods[r].twist, rods[r].bends, rods[r].flat);
+  };
   std::stable_sort(order_.begin(), order_.end(), [&](int a, int b) {
     if (shape(a) != shape(b)) return shape(a) < shape(b);
     return held_[a - set.begin] < held_[b - set.begin];
@@ -56,28 +78,32 @@ BandedFactor::BandedFactor(const DofMap &dofs, RodSet set, BandedWorkspace &work
     if (v.size() < size) v.resize(size, 0.0);
     bytes_ += size * sizeof(double);
   };
-  grow(workspace.factors, plan(nullptr)); // no smaller set of rods needs more
+  grow(workspace.factors, plan(nullptr, true)); // nothing else needs more
   grow(workspace.rows, rows * lanes);
 }
 
 bool BandedFactor::sameShape(int a, int b) const {
   const RodRange &one = dofs_.rods()[a], &other = dofs_.rods()[b];
   return one.vertices == other.vertices && one.slots == other.slots && one.closed == other.closed &&
-         one.twist == other.twist && held_[a - rods_.begin] == held_[b - rods_.begin];
+         one.twist == other.twist && one.bends == other.bends && one.flat == other.flat &&
+         held_[a - rods_.begin] == held_[b - rods_.begin];
 }
 
 /// Groups of the active rods of each shape: whole packs; of the rest, a pack when that is cheaper than one after the
 /// other. Returns how many numbers their factors take.
-std::size_t BandedFactor::plan(const char *active) {
+/// \param joins as EdgeBlocks::joins
+std::size_t BandedFactor::plan(const char *active, bool joins) {
   constexpr int worth_a_pack = 3;
   groups_.clear();
   std::size_t size = 0;
   auto close = [&](Group group, bool packed) {
     const RodRange &rod = dofs_.rods()[group.rod[0]];
     group.packed = packed;
+    group.reduced = !rod.twist && !rod.closed && !joins;
     group.factor = size;
-    size += packed ? lanes * (vertex_record + rod.edges * Record<Pack>::of(rod))
-                   : vertex_record + rod.edges * Record<double>::of(rod);
+    size += packed ? lanes * (vertex_record + rod.edges * perEdge<Pack>(rod, group.reduced))
+                   : vertex_record + rod.edges * perEdge<double>(rod, group.reduced);
+    size = (size + lanes - 1) / lanes * lanes; // packs begin where they can be read at once
     groups_.push_back(group);
   };
   Group open{};
@@ -104,7 +130,7 @@ std::size_t BandedFactor::plan(const char *active) {
 }
 
 void BandedFactor::factor(const BandedSystem &system) {
-  plan(system.active->data());
+  plan(system.active->data(), system.blocks->joins());
   for (const Group &group : groups_)
     if (group.packed)
       factorGroup<Pack>(group, system);
@@ -127,6 +153,7 @@ template <class T> void BandedFactor::factorGroup(const Group &group, const Band
     shifted = shifted || shift[l] != 0;
   }
   const bool cable = !first.twist;
+  const Missing missing(first);
   auto value = [&](std::size_t at, auto added) {
     if constexpr (std::is_same_v<T, Pack>)
       return Pack([&](auto lane) { return source[lane][at] + added(lane); });
@@ -142,6 +169,7 @@ template <class T> void BandedFactor::factorGroup(const Group &group, const Band
   };
   // A shift adds to the diagonal of positions, edges and twists; the twist of a cable is no unknown.
   auto rare = [&](int plane, int i) {
+    if (missing.any() && !group.reduced && missing.has(plane)) return T(missing[plane]);
     const std::size_t at = std::size_t(plane) * first.slots + i;
     if (plane == EdgeBlocks::own(3, 3)) return value(at, [&](int l) { return cable ? 1.0 : shift[l] * spin[l][i]; });
     if (plane == EdgeBlocks::vertex(0, 0) || plane == EdgeBlocks::vertex(1, 1) || plane == EdgeBlocks::vertex(2, 2))
@@ -150,27 +178,12 @@ template <class T> void BandedFactor::factorGroup(const Group &group, const Band
       return value(at, [&](int l) { return edge[l] && i < first.edges ? shift[l] * edge[l][i] : 0.0; });
     return value(at, [](int) { return 0.0; });
   };
-  const std::vector<char> &held = held_[group.rod[0] - rods_.begin];
-  T *const vertex = as<T>(&workspace_.factors[group.factor]), *const records = vertex + vertex_record;
   const bool joins = system.blocks->joins();
   T negative, zero;
-  auto run = [&](auto elimination) {
-    elimination.run(vertex);
-    negative = elimination.negative;
-    zero = elimination.zero;
-  };
-  auto eliminate = [&]<bool ring, bool joined>(const auto &read) {
-    run(Elimination < T, ring ? Border::ring : Border::none, joined,
-        std::decay_t < decltype(read) >> ({0, first.edges}, held, read, records));
-  };
-  if (first.closed)
-    joins ? eliminate.template operator()<true, true>(rare) : eliminate.template operator()<true, false>(rare);
-  else if (joins)
-    eliminate.template operator()<false, true>(rare);
-  else if (shifted || cable || system.coupled_positions)
-    eliminate.template operator()<false, false>(rare);
+  if (first.closed || joins || shifted || system.coupled_positions || (cable && !group.reduced))
+    eliminate<true>(group, rare, joins, &negative, &zero);
   else
-    eliminate.template operator()<false, false>(plain);
+    eliminate<false>(group, plain, joins, &negative, &zero);
   for (int l = 0; l < group.count; ++l)
     if constexpr (std::is_same_v<T, Pack>) {
       negative_[group.rod[l] - rods_.begin] = int(negative[l]);
@@ -179,6 +192,30 @@ template <class T> void BandedFactor::factorGroup(const Group &group, const Band
       negative_[group.rod[l] - rods_.begin] = int(negative);
       zero_[group.rod[l] - rods_.begin] = int(zero);
     }
+}
+
+/// \tparam any also rings, and rods whose positions have entries with edges
+template <bool any, class T, class Read>
+void BandedFactor::eliminate(const Group &group, const Read &read, bool joins, T *negative, T *zero) {
+  const RodRange &rod = dofs_.rods()[group.rod[0]];
+  const std::vector<char> &held = held_[group.rod[0] - rods_.begin];
+  T *const vertex = as<T>(&workspace_.factors[group.factor]), *const records = vertex + vertex_record;
+  if (group.reduced)
+    return withShape(rod, [&](auto shape) {
+      eliminateReduced<decltype(shape)>(rod.edges, held, read, vertex, records, *negative, *zero);
+    });
+  auto run = [&]<Border border, bool joined>() {
+    Elimination<T, border, joined, Read> elimination({0, rod.edges}, held, read, records);
+    elimination.run(vertex);
+    *negative = elimination.negative;
+    *zero = elimination.zero;
+  };
+  if constexpr (any) {
+    if (rod.closed)
+      return joins ? run.template operator()<Border::ring, true>() : run.template operator()<Border::ring, false>();
+    if (joins) return run.template operator()<Border::none, true>();
+  }
+  run.template operator()<Border::none, false>();
 }
 
 void BandedFactor::solve(const PetscScalar *b, PetscScalar *x) {
@@ -198,12 +235,26 @@ void BandedFactor::solve(const PetscScalar *b, PetscScalar *x) {
       solveGroup<double>(group, b, x);
 }
 
+/// Of the right-hand sides in the workspace's rows makes solutions.
+template <class T> void BandedFactor::substitute(const Group &group) {
+  const RodRange &rod = dofs_.rods()[group.rod[0]];
+  const std::vector<char> &held = held_[group.rod[0] - rods_.begin];
+  const T *const vertex = as<T>(&workspace_.factors[group.factor]), *const records = vertex + vertex_record;
+  T *const values = as<T>(workspace_.rows.data());
+  if (group.reduced)
+    withShape(rod, [&](auto shape) { substituteReduced<decltype(shape)>(rod.edges, held, vertex, records, values); });
+  else if (rod.closed)
+    substituteAll<T, true>(rod, held, records, vertex, values);
+  else
+    substituteAll<T, false>(rod, held, records, vertex, values);
+}
+
 template <class T> void BandedFactor::solveGroup(const Group &group, const PetscScalar *b, PetscScalar *x) {
   constexpr int step = sizeof(T) / sizeof(double);
   const RodRange &first = dofs_.rods()[group.rod[0]];
   const std::vector<char> &held = held_[group.rod[0] - rods_.begin];
-  const T *const vertex = as<T>(&workspace_.factors[group.factor]), *const records = vertex + vertex_record;
   double *const values = workspace_.rows.data();
+  const int coordinates = group.reduced && first.flat >= 0 ? 2 : 3; // reduced kernels want those that count first
   // Calls visit(value, unknown) for the unknowns and rest(value) for what is held or does not exist.
   auto eachValue = [&](auto visit, auto rest) {
     for (int l = 0; l < group.count; ++l) {
@@ -211,24 +262,21 @@ template <class T> void BandedFactor::solveGroup(const Group &group, const Petsc
       PetscInt u = dofs_.firstUnknown({r, r + 1}) - dofs_.firstUnknown(rods_);
       double *v = values + l;
       for (int i = 0; i < first.vertices; ++i) {
-        for (int a = 0; a < 3; ++a, v += step)
-          if (held[i])
-            rest(*v);
+        for (int a = 0; a < coordinates; ++a)
+          if (held[i] || (coordinates == 3 && a == first.flat))
+            rest(v[a * step]);
           else
-            visit(*v, u++);
+            visit(v[a * step], u++);
         if (first.twist && i < first.edges)
-          visit(*v, u++);
+          visit(v[3 * step], u++);
         else
-          rest(*v);
-        v += step;
+          rest(v[3 * step]);
+        v += slot_size * step;
       }
     }
   };
   eachValue([&](double &value, PetscInt u) { value = b[u]; }, [](double &value) { value = 0; });
-  if (first.closed)
-    substituteAll<T, true>(first, held, records, vertex, as<T>(values));
-  else
-    substituteAll<T, false>(first, held, records, vertex, as<T>(values));
+  substitute<T>(group);
   eachValue([&](const double &value, PetscInt u) { x[u] = value; }, [](double &) {});
 }
 

@@ -7,6 +7,37 @@ namespace tendril {
 
 using C = Configuration;
 
+namespace {
+
+/// Directors of a rod in space whose twists are no unknowns: it is twisted nowhere, so they go from edge to edge by the
+/// minimal rotation, and by the twist at rest. They begin at the end that holds them, or at the first edge, whose own
+/// has gone with it.
+void spreadDirectors(const Elements &elements, const C &c, int r, State &state) {
+  const RodRange &rod = elements.rods[r];
+  const bool first = elements.cell_begin[r] == rod.slot(0), last = elements.cell_end[r] > rod.slot(rod.edges);
+  auto angle = [&](int slot) {
+    const double strain = elements.cells()[cell_rest + 2][slot];
+    return elements.measure[r] == Measure::tan ? 2 * std::atan(strain / 2) : strain;
+  };
+  auto tangent = [&](int i) { return c.frameAt(rod.slot(i)).tangent; };
+  auto director = [&](int i) -> Vec3 & { return state.director[rod.first_edge + i]; };
+  if (!first && last) {
+    Vec3 d = c.frameAt(rod.slot(rod.edges)).director;
+    for (int i = rod.edges - 1; i >= 0; --i) {
+      d = rotateAbout<double>(d, tangent(i + 1), -angle(rod.slot(i + 1)));
+      d = director(i) = orthonormalised(transport<double>(d, tangent(i + 1), tangent(i)), tangent(i));
+    }
+    return;
+  }
+  Vec3 d = first ? c.frameAt(rod.slot(-1)).director : director(0);
+  for (int i = first ? 0 : 1; i < rod.edges; ++i) {
+    d = rotateAbout<double>(transport<double>(d, tangent(i - 1), tangent(i)), tangent(i), angle(rod.slot(i)));
+    d = director(i) = orthonormalised(d, tangent(i));
+  }
+}
+
+} // namespace
+
 [[gnu::flatten]] void commitConfiguration(const Elements &elements, const Configuration &iterate, RodSet rods,
                                           State &state) {
   for (int r = rods.begin; r < rods.end; ++r) {
@@ -43,6 +74,7 @@ using C = Configuration;
         state.axial_force[e] = iterate[C::axial_force][slot + l];
       }
     }
+    if (rod.isReduced() && rod.flat < 0) spreadDirectors(elements, iterate, r, state);
   }
 }
 
@@ -70,7 +102,7 @@ using C = Configuration;
       }
     }
     for (int i = 0; i < rod.edges; i += lanes) {
-      const Pack d = spinOver(twist_reference, iterate, rod.slot(i));
+      const Pack d = rod.isReduced() ? Pack(0.0) : spinOver(twist_reference, iterate, rod.slot(i));
       for (int l = 0; l < std::min(lanes, rod.edges - i); ++l) {
         out.displacement.edge[rod.first_edge + i + l] = d[l];
         out.velocity.edge[rod.first_edge + i + l] = d[l] * rate;

@@ -23,6 +23,23 @@ template <class T> auto crossesFold(const std::array<FrameOf<T>, 2> &before, con
 bool anyLane(bool b) { return b; }
 bool anyLane(const Pack::mask_type &m) { return any_of(m); }
 
+/// As crossesFold, of edges without frames of their own.
+bool foldsOver(const Elements &elements, const Configuration &before, const Configuration &after, int rod) {
+  bool any = false;
+  forCells(elements, rod, [&]<class T>(const LooseCell &cell, int count) {
+    auto tangents = [&](const Configuration &c) {
+      return std::array{readVector<T>(c.values(), C::tangent, cell.frame0),
+                        readVector<T>(c.values(), C::tangent, cell.frame1)};
+    };
+    const auto was = tangents(before), is = tangents(after);
+    auto over = was[0].dot(was[1]) <= T(0.0) && is[0].dot(is[1]) <= T(0.0) &&
+                was[0].cross(was[1]).dot(is[0].cross(is[1])) < T(0.0);
+    if constexpr (std::is_same_v<T, Pack>) over = over && firstLanes(count);
+    any = any || anyLane(over);
+  });
+  return any;
+}
+
 } // namespace
 
 Retraction::Retraction(const Elements &elements) : elements_(elements), work_(work_planes, elements.slots) {
@@ -295,6 +312,7 @@ static void moveAll(const RodRange &rod, const Vec3 &by, C &to) {
   using std::floor, std::sqrt;
   const RodRange &rod = elements_.rods[r];
   const Energy energy = elements_.energy[r];
+  const bool turns = rod.twist;
   for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
     const Pack::mask_type live = firstLanes(rod.edgeEnd() - s);
     const Vector3<Pack> e = to.edges<Pack>(s);
@@ -302,8 +320,12 @@ static void moveAll(const RodRange &rod, const Vec3 &by, C &to) {
     const FrameOf<Pack> f = from.frames<Pack>(s);
     const Vector3<Pack> t = e / length;
     if (any_of(!(length > Pack(0.0) && Pack(1.0) + f.tangent.dot(t) > Pack(1e-8)) && live)) return false;
-    const Pack angle = Pack(scale) * read<Pack>(increment[3] + s);
-    const Vector3<Pack> director = rotateAbout<Pack>(transport<Pack>(f.director, f.tangent, t), t, angle);
+    Vector3<Pack> director = transport<Pack>(f.director, f.tangent, t);
+    if (turns) {
+      const Pack angle = Pack(scale) * read<Pack>(increment[3] + s);
+      director = rotateAbout<Pack>(director, t, angle);
+      write(to[C::spin] + s, Pack(read<Pack>(from[C::spin] + s) + angle));
+    }
     for (int a = 0; a < 3; ++a) {
       write(to[C::Plane(C::tangent + a)] + s, select(live, t[a], f.tangent[a]));
       write(to[C::Plane(C::director + a)] + s, select(live, director[a], f.director[a]));
@@ -311,7 +333,6 @@ static void moveAll(const RodRange &rod, const Vec3 &by, C &to) {
     const Pack kept = select(live, length, f.length);
     write(to[C::length] + s, kept);
     write(to[C::strain] + s, axialStrain<Pack>(energy, kept, read<Pack>(elements_.inverseRestLength() + s)));
-    write(to[C::spin] + s, Pack(read<Pack>(from[C::spin] + s) + angle));
   }
   to.closeRing(rod);
   auto move = [&](int slot) {
@@ -345,6 +366,7 @@ static void moveAll(const RodRange &rod, const Vec3 &by, C &to) {
   // holonomy. Half a turn is a barrier of the measure `tan`: no step leads across it.
   bool possible = true;
   const bool barrier = elements_.measure[r] == Measure::tan;
+  if (rod.isReduced()) return !barrier || !foldsOver(elements_, from, to, r);
   forCells(elements_, r, [&]<class T>(const LooseCell &cell, int count) {
     auto turned = [&](int frame) { return T(read<T>(to[C::spin] + frame) - read<T>(from[C::spin] + frame)); };
     const T expected = read<T>(from[C::twist] + cell.slot) + turned(cell.frame1) - turned(cell.frame0);

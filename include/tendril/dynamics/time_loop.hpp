@@ -62,6 +62,10 @@ public:
   /// Called where what different ranks have may touch in the next step, to have it on one: the state and the solver are
   /// those of what this rank has then, or `stays` is false where that is nothing.
   std::function<PetscErrorCode(bool *stays)> unite;
+  /// Asked with the state that a step would lead to, and whether it has met an unstable equilibrium, whether the scene
+  /// must be modelled with more unknowns: the state and the solver are those of more unknowns then, and the step is
+  /// taken anew.
+  std::function<PetscErrorCode(const State &next, bool unstable, bool *widened)> widen;
   std::function<bool()>
       stops; ///< asked in each step whether to end after it: `finished` is false then, and failure() is empty
   TimeLoop(StepSolver &solver, const LoopSettings &settings)

@@ -201,6 +201,7 @@ std::vector<std::unique_ptr<Term>> makeRodTerms(const Scene &scene, const Elemen
                                                 bool dynamic);
 
 std::unique_ptr<Term> makeBendTwist(const Scene &, const Elements &);
+std::unique_ptr<Term> makeBend(const Scene &, const Elements &);
 std::unique_ptr<Term> makeStretch(const Elements &, const AxialLaw &);
 std::unique_ptr<Term> makeInertia(const Scene &, const Elements &);
 std::unique_ptr<Term> makeLoad(const Scene &, const Elements &);

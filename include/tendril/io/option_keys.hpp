@@ -79,6 +79,13 @@ inline constexpr Key option_keys[] = {
     {"-rounding_tolerance", KeyType::number, "", "1e-3",
      "where rounding stops Newton: what is left of the answer, over what the step or its loads move, at most", fraction,
      "", "1e-4", "solver"},
+    {"-model", KeyType::word, "", "(of the scene)",
+     "unknowns of all rods: full, torsion_free, planar, cable, or auto: the fewest that are proven to do", anything,
+     "full|torsion_free|planar|cable|auto", "auto", "solver"},
+    {"-model_check", KeyType::flag, "", "false",
+     "run the scene again with all unknowns of all rods, tell how far its last state is, and fail where it is farther "
+     "than -accuracy, or 1e-6, rod lengths",
+     anything, "", "", "solver"},
     {"-stretch", KeyType::word, "", "mixed", "axial force: from the strain (primal), or an unknown of its own (mixed)",
      anything, "primal|mixed", "primal", "solver"},
     {"-retraction", KeyType::word, "", "length",

@@ -42,6 +42,7 @@ struct Options {
   std::optional<double> time_limit;   ///< [s]
   std::set<std::string> fields;
   bool error_estimate = false;
+  bool model_check = false;
   std::optional<Accuracy> accuracy;
   std::optional<Quantity> accuracy_of; ///< as given
 };

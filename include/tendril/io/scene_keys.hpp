@@ -146,6 +146,10 @@ inline constexpr Key scene_keys[] = {
      "law of stretch and bending: seed, curvatures times the stretch and strain ((l/L)^2 - 1)/2; classical, without "
      "that factor, and strain l/L - 1",
      anything, "seed|classical", "classical"},
+    {"rods[].model", KeyType::word, "", "full",
+     "unknowns: full, positions and twist; torsion_free, no twist; planar, two coordinates; cable, neither bends nor "
+     "twists; auto, the fewest that are proven to do",
+     anything, "full|torsion_free|planar|cable|auto", "auto"},
     {"rods[].gravity", KeyType::flag, "", "true", "whether gravity acts on it", anything, "", "false"},
     {"rods[].velocity", KeyType::vector, "m/s", "[0, 0, 0]", "of all vertices at the start", anything, "", "[0, 0, 1]"},
     {"rods[].copies", KeyType::map, "", "(one)", "the same rod several times"},

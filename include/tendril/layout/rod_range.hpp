@@ -17,9 +17,15 @@ struct RodRange {
   int first_edge, edges;
   int first_slot; ///< of vertex 0; a multiple of the lanes
   int slots;      ///< from this rod's first slot to the next rod's
-  bool twist;     ///< false for a cable
+  bool twist;     ///< whether the twists of its edges are unknowns
   bool closed;
+  bool bends;    ///< false for a cable
+  int flat = -1; ///< coordinate that is no unknown, of a planar rod; -1: none
 
+  /// Whether a vertex has this coordinate, or an edge the twist (3), as an unknown where nothing holds it.
+  bool has(int a) const { return a == 3 ? twist : a != flat; }
+  /// Bends, and has fewer unknowns than a rod that bends and twists.
+  bool isReduced() const { return bends && !twist; }
   int slot(int i) const { return first_slot + i; }
   int vertexEnd() const { return first_slot + vertices; }
   int edgeEnd() const { return first_slot + edges; }

@@ -7,6 +7,7 @@
 #include "tendril/model/contact.hpp"
 #include "tendril/model/joint.hpp"
 #include "tendril/model/material.hpp"
+#include "tendril/model/rod_model.hpp"
 #include "tendril/model/skin.hpp"
 #include "tendril/model/strain.hpp"
 #include "tendril/model/tendon.hpp"
@@ -37,6 +38,10 @@ struct Rod {
   Material material;
   Measure measure = Measure::tan;
   Energy energy = Energy::seed;
+  RodModel model = RodModel::full;
+  bool chooses_model = false;           ///< the smallest that is proven to do (settleModels)
+  int flat = -1;                        ///< of a planar rod: the coordinate that stays; else -1
+  std::array<double, 2> left_out{0, 0}; ///< flexural stiffness that the model `cable` does not count [N m^2]
   bool gravity = true;
   ContactSettings contact;
   std::shared_ptr<const SkinRecipe> skin; ///< null: none
@@ -53,6 +58,8 @@ struct Rod {
   int next(int vertex) const { return vertex + 1 == vertices() ? 0 : vertex + 1; }
   Vec3 edge(int i) const { return position[next(i)] - position[i]; }
   double length() const; ///< of all edges [m]
+  bool bends() const { return !material.isCable(); }
+  bool twists() const { return bends() && model == RodModel::full; } ///< whether twists are unknowns
   /// Edge on the far side of a vertex (towards lower numbers), or -1 at the first vertex of an open rod; and the other
   /// way.
   int edgeBefore(int vertex) const { return vertex > 0 ? vertex - 1 : closed ? edges() - 1 : -1; }

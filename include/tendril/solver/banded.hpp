@@ -67,8 +67,8 @@ private:
   struct Group {
     std::array<int, lanes> rod;
     int count;
-    bool packed;
-    std::size_t factor; ///< where its factor begins
+    bool packed, reduced; ///< by the kernel for fewer unknowns
+    std::size_t factor;   ///< where its factor begins
   };
   const DofMap &dofs_;
   RodSet rods_;
@@ -80,8 +80,11 @@ private:
   std::size_t bytes_ = 0;
 
   bool sameShape(int a, int b) const;
-  std::size_t plan(const char *active);
+  std::size_t plan(const char *active, bool joins);
   template <class T> void factorGroup(const Group &group, const BandedSystem &system);
+  template <bool any, class T, class Read>
+  void eliminate(const Group &group, const Read &read, bool joins, T *negative, T *zero);
+  template <class T> void substitute(const Group &group);
   template <class T> void solveGroup(const Group &group, const PetscScalar *b, PetscScalar *x);
 };
 

@@ -1,0 +1,31 @@
+#pragma once
+/// \file plane_watch.hpp
+/// Whether planar rods (RodModel) would stay in their planes if they were free to leave them.
+
+#include "tendril/dynamics/simulation.hpp"
+
+namespace tendril {
+
+/// Counts, after a step of planar rods, the unstable motions of the same rods with all unknowns: what the plane holds
+/// is at rest in it, and a motion out of it that lowers the energy is one that the planar rod does not have. In
+/// dynamics it counts those that grow so fast that they would come out of rounding before the end.
+class PlaneWatch {
+public:
+  /// \param scene with planar rods, of which those that choose their model may leave their planes
+  PetscErrorCode setUp(const Scene &scene, const LoopSettings &settings);
+  /// Whether a state is unstable out of its planes; in statics its time is the load factor.
+  PetscErrorCode check(const State &state, bool *leaves);
+
+private:
+  Simulation full_;
+  Step step_;
+};
+
+/// The scene in which rods that chose to be planar have all unknowns.
+Scene freeOfPlanes(Scene scene);
+/// Whether a rod of the scene chose to be planar.
+bool hasChosenPlanes(const Scene &scene);
+/// The first planar rod of a scene whose state is out of its plane, or moves out of it; -1: none.
+int leftPlane(const Scene &scene, const State &state);
+
+} // namespace tendril

@@ -1,0 +1,90 @@
+#!/usr/bin/python3
+"""Models of rods as runs: models.py <tendril>. Planar rods that buckle go on as full ones, restarts find out, and
+-model_check proves what was chosen."""
+import os
+import subprocess
+import sys
+import tempfile
+
+import h5py
+import numpy as np
+
+program = os.path.abspath(sys.argv[1])
+
+COLUMN = """gravity: {gravity}
+simulation: {{mode: static, load_steps: 10}}
+rods:
+  - line: {{from: [0, 0, 0], to: [0, 1, 0], edges: 32}}
+    director: [0, 0, 1]
+    material: {{linear_density: 1, axial_stiffness: 1e6, torsional_stiffness: 1, flexural_stiffness: [{out}, {within}]}}
+supports: [{{vertex: 0, type: clamp}}]
+"""
+HEAD = "loads: [{vertex: last, force: [0, -4, 0]}]\n"
+
+
+def run(folder, text, *options, code=0, output="out"):
+    with open(f"{folder}/scene.yaml", "w") as f:
+        f.write(text)
+    done = subprocess.run([program, "-scene", "scene.yaml", "-output_dir", output, *options], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == code, f"{options}: exit code {done.returncode}\n{done.stdout}\n{done.stderr}"
+    return done.stdout + done.stderr
+
+
+def read(folder, output="out"):
+    with h5py.File(f"{folder}/{output}/trajectory.h5") as f:
+        critical = f["critical/load_factor"][:] if "critical" in f else np.zeros(0)
+        return f["state/position"][-1], critical
+
+
+def buckling():
+    """Columns buckle where full ones do, and go on as these. Euler's load pi^2/4 and
+    Greenhill's 7.837 (Greenhill 1881), each over the load of the scene; the edges' error is 2e-4 at 32 of them."""
+    weight = "[0, -10, 0]"
+    cases = (
+        ("Euler, round", COLUMN.format(gravity="[0, 0, 0]", out=1, within=1) + HEAD, np.pi**2 / 16),
+        ("Euler, in the plane", COLUMN.format(gravity="[0, 0, 0]", out=3, within=1) + HEAD, np.pi**2 / 16),
+        ("Euler, out of it", COLUMN.format(gravity="[0, 0, 0]", out=1, within=3) + HEAD, np.pi**2 / 16),
+        ("Greenhill, round", COLUMN.format(gravity=weight, out=1, within=1), 7.837347 / 10),
+        ("Greenhill, out of the plane", COLUMN.format(gravity=weight, out=1, within=3), 7.837347 / 10),
+    )
+    for name, text, factor in cases:
+        with tempfile.TemporaryDirectory() as folder:
+            told = run(folder, text, "-model", "auto")
+            assert "model auto: planar" in told and "go on as full ones" in told, f"{name}:\n{told}"
+            x, critical = read(folder)
+            run(folder, text, "-model", "full", output="full")
+            full, of_full = read(folder, "full")
+            assert len(critical) == len(of_full) and np.allclose(critical, of_full, atol=1e-7), f"{name}: {critical} {of_full}"
+            assert abs(critical[0] - factor) < 1e-3 * factor, f"{name}: {critical[0]}, not {factor}"
+            aside = np.hypot(full[:, 0], full[:, 2]).max()
+            assert aside > 0.1 and np.abs(x - full).max() < 1e-6, f"{name}: {np.abs(x - full).max()}"
+
+
+def restarts():
+    """A state out of its plane goes on in space where the model is chosen, and is refused where it is not."""
+    text = COLUMN.format(gravity="[0, -10, 0]", out=1, within=1).replace("mode: static, load_steps: 10", "mode: dynamic, dt: 0.01, t_end: 0.2")
+    with tempfile.TemporaryDirectory() as folder:
+        run(folder, text.replace("[0, -10, 0]", "[1, -10, 1]"), "-model", "full")
+        told = run(folder, text, "-model", "auto", "-restart", "out", "-t_end", "0.3", output="on")
+        assert "go on as full ones" in told, told
+        x, _ = read(folder, "on")
+        assert min(np.abs(x[:, 0]).max(), np.abs(x[:, 2]).max()) > 1e-4, "the rod has come back to a plane"
+        told = run(folder, text, "-model", "planar", "-restart", "out", "-t_end", "0.3", code=1, output="no")
+        assert "begins out of its plane" in told, told
+
+
+def proofs():
+    text = COLUMN.format(gravity="[3, 0, 0]", out=1, within=1)
+    with tempfile.TemporaryDirectory() as folder:
+        told = run(folder, text, "-model", "auto", "-model_check")
+        assert "model check: full rods end" in told, told
+        told = run(folder, text, "-model", "cable", "-model_check", code=2)
+        assert "take -model full" in told, told
+        told = run(folder, text, "-model", "auto", "-model_check", "-continuation", "arclength", code=1)
+        assert "-model_check" in told, told
+
+
+buckling()
+restarts()
+proofs()
+print("models hold")
