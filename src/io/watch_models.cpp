@@ -53,9 +53,11 @@ PetscErrorCode proveModels(const Prepared &prepared, const Options &o, double se
   PetscFunctionBeginUser;
   const Simulation &run = prepared.whole();
   Scene scene = run.scene;
-  if (std::all_of(scene.rods.begin(), scene.rods.end(),
-                  [](const Rod &r) { return r.model == RodModel::full && !r.chooses_model; })) {
-    progress.say("model check: all rods are full, there is nothing to prove");
+  const auto leaves_out = [](const Rod &r) {
+    return r.bends() ? r.chooses_model || r.model != RodModel::full : r.left_out != std::array{0.0, 0.0};
+  };
+  if (std::none_of(scene.rods.begin(), scene.rods.end(), leaves_out)) {
+    progress.say("model check: no rod leaves anything out, there is nothing to prove");
     PetscFunctionReturn(0);
   }
   for (Rod &rod : scene.rods) {

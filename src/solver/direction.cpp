@@ -157,7 +157,7 @@ PetscErrorCode NewtonSolver::findIndefinite(Vec y, bool regular, bool *any) {
 /// diagonal shifted only if that is not enough. In statics an equilibrium of couples need not be a minimum of anything:
 /// there Newton's own direction stands.
 PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
-  constexpr int few = 4;          // the two planes of the first two buckling modes
+  constexpr int few = 2;          // the first two buckling modes, in each plane
   constexpr double longest = 0.1; // of the rod's length
   PetscFunctionBeginUser;
   if (regular && circulatory_ && potential_->step().isStatic()) {
@@ -174,7 +174,8 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
   bool compressed = false;
   for (const RodSet island : islands_) {
     const int r = island.begin;
-    if (!work_->active[r] || !work_->indefinite[r] || work_->negative[r] <= few) continue;
+    const int planes = potential_->elements().rods[r].flat < 0 ? 2 : 1;
+    if (!work_->active[r] || !work_->indefinite[r] || work_->negative[r] <= few * planes) continue;
     potential_->assemble(island, kind);
     compressed = true;
   }
@@ -191,13 +192,15 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
     longer = false;
     PetscCall(potential_->dofs().scatter(y, rods_, work_->increment));
     for (const RodSet island : islands_) {
-      if (!(work_->active[island.begin] && work_->shift[island.begin] > 0)) continue;
+      if (!(work_->active[island.begin] && (work_->shift[island.begin] > 0 || work_->indefinite[island.begin])))
+        continue;
       double size = 0;
       for (int r = island.begin; r < island.end; ++r)
         if (work_->edge_metric[potential_->elements().rods[r].first_slot] > 0) // what hangs on one place swings
           size = std::max(size, sizeOf(r, work_->increment));
       if (!(size > longest)) continue;
-      const double shift = work_->shift[island.begin] * std::min(size / longest, 1e6);
+      const double now = work_->shift[island.begin] > 0 ? work_->shift[island.begin] : firstShift(island),
+                   shift = now * std::min(size / longest, 1e6);
       fill(work_->shift, island, shift);
       fill(work_->last_shift, island, shift);
       longer = true;
