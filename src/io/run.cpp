@@ -5,6 +5,7 @@
 #include "tendril/dynamics/simulation.hpp"
 #include "tendril/io/estimate_writer.hpp"
 #include "tendril/io/keys.hpp"
+#include "tendril/io/mode_output.hpp"
 #include "tendril/io/option_files.hpp"
 #include "tendril/io/options.hpp"
 #include "tendril/io/prepare.hpp"
@@ -246,6 +247,7 @@ PetscErrorCode runPrepared(Prepared &prepared, int argc, char **argv, const Opti
   if (finished && o.error_estimate && o.loop.dynamic) tellTimeError(recorder.last(), o, progress);
   if (finished && o.error_estimate && !o.loop.dynamic)
     PetscCall(tellError(prepared, recorder.last().rounding_error, recorder.criticalFactors(), o, progress));
+  if (finished && o.modes > 0) PetscCall(tellModes(run, o, progress, exit_code));
   PetscFunctionReturn(0);
 }
 
@@ -267,6 +269,7 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   if (!prepared.team.isEmpty()) PetscCall(findUnused(prepared.team, prepared.run->scene.touchesMoving(), &unknown));
   world.together([&] {
     if (!unknown.empty()) refuseUnused(unknown);
+    if (o.modes > 0) refuseTooManyModes(*prepared.run, o.modes);
     if (!world.leads()) return;
     begun.folder.emplace(o.output_dir);
     std::vector<std::string> inputs = files.files();
