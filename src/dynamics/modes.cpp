@@ -23,7 +23,7 @@ namespace {
 using OwnedEPS = Owned<EPS, EPSDestroy>;
 
 constexpr double residual_tolerance = 1e-10; // of eigenvectors: eigenvalues are right to its square over their distance
-constexpr double free_part = 1e-9;           // of the shift: what rounding leaves of motions that cost nothing
+constexpr double free_part = 1e-10, stretch_part = 300 * epsilon; // of the shift; of EA/(rho L^2)
 
 /// SLEPc, which has no use for the command line, until PETSc ends.
 PetscErrorCode startSlepc() {
@@ -46,7 +46,7 @@ public:
   /// From the lowest on.
   std::vector<double> eigenvalues() const;
   PetscErrorCode shape(int k, Rates *out);
-  double shift() const { return shift_; }
+  double zero() const; ///< \see Modes
 
   // What SLEPc calls.
   PetscErrorCode applyMass(Vec x, Vec y);
@@ -78,6 +78,10 @@ PetscErrorCode massCallback(Mat m, Vec x, Vec y) {
   PetscFunctionReturn(0);
 }
 
+/// In place of K, which SLEPc multiplies by only to ask whether modes that it leaves out are in the null space of
+/// K - s M: none is.
+PetscErrorCode stiffnessCallback(Mat, Vec x, Vec y) { return VecCopy(x, y); }
+
 PetscErrorCode inverseCallback(PC pc, Vec x, Vec y) {
   IslandModes *modes;
   PetscFunctionBeginUser;
@@ -104,20 +108,23 @@ PetscErrorCode IslandModes::applyInverse(Vec x, Vec y) {
 }
 
 /// Of about the size of the largest eigenvalue that is asked for, by the inertia: far below it, iterations are many and
-/// digits of the lower ones are lost, far above them those of the others. And below all eigenvalues.
+/// digits of the upper ones are lost, far above it those of the lower ones. And below all eigenvalues.
 PetscErrorCode IslandModes::chooseShift(int count) {
-  constexpr int most = 60;
+  constexpr int most = 60, most_down = 9; // beyond, as many motions cost nothing
   constexpr double factor = 16;
   PetscFunctionBeginUser;
-  shift_ = block_.slowestBending(island_);
+  const double first = shift_ = block_.slowestBending(island_);
   int below;
   PetscCall(countBelow(shift_, &below));
-  const bool shrinks = below >= count;
-  for (int k = 0; k < most && below >= 0 && (below >= count) == shrinks; ++k) {
-    const double next = shrinks ? shift_ / factor : shift_ * factor;
+  const bool goes_down = below >= count;
+  for (int k = 0; k < most && below >= 0 && (below >= count) == goes_down; ++k) {
+    const double next = goes_down ? shift_ / factor : shift_ * factor;
     PetscCall(countBelow(next, &below));
-    if (shrinks && below >= count && k > 8) break; // as many motions cost nothing
-    if (!shrinks || below >= count) shift_ = next;
+    if (!goes_down || below >= count) shift_ = next;
+    if (goes_down && k == most_down) {
+      shift_ = first;
+      break;
+    }
   }
   for (int k = 0; k < most; ++k) {
     PetscCall(countBelow(-shift_, &below));
@@ -140,6 +147,7 @@ PetscErrorCode IslandModes::search(int count) {
   PetscCall(countBelow(-shift_, &negative)); // its factor is what applyInverse solves with
   for (OwnedMat *m : {&stiffness, &mass}) PetscCall(MatCreateShell(PETSC_COMM_SELF, n, n, n, n, this, m->out()));
   PetscCall(MatShellSetOperation(mass, MATOP_MULT, (void (*)(void))massCallback));
+  PetscCall(MatShellSetOperation(stiffness, MATOP_MULT, (void (*)(void))stiffnessCallback));
   PetscCall(EPSCreate(PETSC_COMM_SELF, eps.out()));
   PetscCall(EPSSetOperators(eps, stiffness, mass));
   PetscCall(EPSSetProblemType(eps, EPS_GHEP));
@@ -212,6 +220,17 @@ PetscErrorCode IslandModes::find(int count, std::string *failure) {
   PetscFunctionReturn(0);
 }
 
+/// What Newton leaves of the balance of forces, and rounding of stiff edges, whose directions are off by an epsilon.
+double IslandModes::zero() const {
+  double stretch = 0;
+  for (int r = island_.begin; r < island_.end; ++r) {
+    const Material &m = potential_.scene().rods[std::size_t(r)].material;
+    const double length = potential_.length(r);
+    if (!m.isCable()) stretch = std::max(stretch, m.axial_stiffness / (m.linear_density * length * length));
+  }
+  return std::max(free_part * shift_, stretch_part * stretch);
+}
+
 std::vector<double> IslandModes::eigenvalues() const {
   std::vector<double> values;
   for (const Mode &m : found_) values.push_back(m.eigenvalue);
@@ -226,7 +245,7 @@ PetscErrorCode IslandModes::shape(int k, Rates *out) {
   out->vertex.assign(std::size_t(e.vertices()), Vec3::Zero());
   out->edge.assign(std::size_t(e.edges()), 0.0);
   out->body.assign(std::size_t(e.bodyCount()), BodyRate());
-  double largest = 0;
+  double largest = 0, most_twisted = 0, length = 0;
   auto note = [&](const Vec3 &moved) {
     for (const double d : moved)
       if (std::abs(d) > std::abs(largest) * (1 + 1e-6)) largest = d;
@@ -236,14 +255,16 @@ PetscErrorCode IslandModes::shape(int k, Rates *out) {
     const RodRange &rod = e.rods[std::size_t(r)];
     for (int i = 0; i < rod.vertices; ++i)
       out->vertex[std::size_t(rod.first_vertex + i)] = note(solution_.vector(0, rod.slot(i)));
-    for (int i = 0; i < rod.edges; ++i) out->edge[std::size_t(rod.first_edge + i)] = solution_[3][rod.slot(i)];
+    for (int i = 0; i < rod.edges; ++i) {
+      const double twist = out->edge[std::size_t(rod.first_edge + i)] = solution_[3][rod.slot(i)];
+      if (std::abs(twist) > std::abs(most_twisted) * (1 + 1e-6)) most_twisted = twist;
+    }
+    length += e.length(r);
     for (const JoinedBody &b : e.bodies({r, r + 1}))
       out->body[std::size_t(b.body)] = {note(solution_.vector(0, b.position)), solution_.vector(0, b.rotation),
                                         Vec3::Zero()};
   }
-  if (largest == 0) // only twists
-    for (const double t : out->edge)
-      if (std::abs(t) > std::abs(largest) * (1 + 1e-6)) largest = t;
+  if (std::abs(largest) < 1e-6 * length * std::abs(most_twisted)) largest = most_twisted; // it only twists
   const double size = std::copysign(1 / std::sqrt(potential_.dofs().dot(island_, right_, solution_)), largest);
   for (Vec3 &v : out->vertex) v *= size;
   for (double &t : out->edge) t *= size;
@@ -259,7 +280,7 @@ PetscErrorCode findModes(StepSolver &solver, const State &state, Step step, int 
   PetscCall(startSlepc());
   const Doing here([](std::ostream &out) { out << "natural frequencies are found"; });
   step.time = step.load_factor = state.time;
-  step.stiff_joints = true;
+  step.small_motions = true;
   NewtonReport report;
   {
     const SharpTolerance sharp(solver);
@@ -285,7 +306,7 @@ PetscErrorCode findModes(StepSolver &solver, const State &state, Step step, int 
       if (!failure->empty()) PetscFunctionReturn(0);
       const std::vector<double> values = one.eigenvalues();
       for (std::size_t k = 0; k < values.size(); ++k) all.push_back({values[k], islands.size() - 1, int(k)});
-      modes->zero = std::max(modes->zero, free_part * one.shift());
+      modes->zero = std::max(modes->zero, one.zero());
     }
   }
   std::stable_sort(all.begin(), all.end(), [](const Place &a, const Place &b) { return a.eigenvalue < b.eigenvalue; });

@@ -137,7 +137,7 @@ void refuseWithRodContact(const Scene &scene, const Options &o) {
 
 void checkScene(const Scene &scene, const Options &o, std::vector<std::string> *notes) {
   if (o.modes > 0) checkModes(scene, o);
-  if (!o.loop.dynamic && !(o.modes > 0 && isUnloaded(scene))) requireHeld(scene);
+  if (!o.loop.dynamic && !(o.modes > 0 && isAlone(scene))) requireHeld(scene);
   if (o.loop.dynamic && !scene.rotation.angular_velocity.isZero(0))
     throw SceneError("scene key 'rotation': is for -mode static, a scene at rest in a frame that turns; in dynamics "
                      "let supports turn by their motion");

@@ -103,10 +103,29 @@ void refuseTooManyModes(const Simulation &run, int count) {
                      std::to_string(most) + " motions with inertia; write at most that, or raise -rod_edges");
 }
 
-bool isUnloaded(const Scene &scene) {
-  return scene.gravity.isZero(0) && scene.forces.empty() && scene.moments.empty() && scene.tendons.empty() &&
+bool isAlone(const Scene &scene) {
+  return std::none_of(scene.supports.begin(), scene.supports.end(),
+                      [](const Support &s) { return s.holdsPosition(); }) &&
+         scene.gravity.isZero(0) && scene.forces.empty() && scene.moments.empty() && scene.tendons.empty() &&
          scene.constraints.empty() && scene.joints.empty() && scene.colliders.empty() && !scene.touchesMoving() &&
          std::all_of(scene.bodies.begin(), scene.bodies.end(), [](const Body &b) { return b.force.isZero(0); });
+}
+
+PetscErrorCode settleAlone(Simulation &run, const Options &o, const TimeLoop::Observer &observe, bool *finished,
+                           std::string *failure) {
+  PetscFunctionBeginUser;
+  NewtonReport report;
+  PetscCall(run.solver.solve(run.state, TimeLoop::stepOf(o.loop, run.state, 1), &report, Seek::equilibrium));
+  *finished = report.converged;
+  if (!*finished) *failure = "the rest state of a scene that nothing holds was not found: " + report.reason;
+  if (!*finished) PetscFunctionReturn(0);
+  run.potential->commit(run.state);
+  Diagnostics row;
+  row.time = row.dt = 1;
+  row.newton_iterations = report.iterations;
+  row.energy = energyBudget(run.scene, *run.elements, run.state, 1);
+  PetscCall(observe(run.state, row));
+  PetscFunctionReturn(0);
 }
 
 PetscErrorCode tellModes(Simulation &run, const Options &o, Progress &progress, int *exit_code) {

@@ -116,7 +116,9 @@ PetscErrorCode march(Prepared &prepared, TimeLoop &loop, const Options &o, const
   auto critical = [&](const CriticalPoint &point) { return recorder.noteCritical(point); };
   auto stops = [&] { return request.asked(); };
   PetscCall(PetscLogStagePush(events().run));
-  if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength) {
+  if (o.modes > 0 && isAlone(run.scene)) {
+    PetscCall(settleAlone(run, o, observe, finished, failure));
+  } else if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength) {
     ArcLength path(run.solver, o.loop);
     path.on_critical = critical;
     path.stops = stops;

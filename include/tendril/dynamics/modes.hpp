@@ -13,8 +13,8 @@ namespace tendril {
 struct Modes {
   std::vector<double> eigenvalue; ///< (n) omega^2; negative where the equilibrium is unstable [1/s^2]
   /// (n) Displacements, twists, and displacements of centres of mass and rotation vectors of bodies, with phi' M phi =
-  /// 1 kg m^2; of both signs that with a positive largest displacement. Twist: by which an edge turns about its
-  /// tangent, parallel transport taken off.
+  /// 1 kg m^2; of both signs that with a positive largest displacement, or twist where nothing is displaced. Twist: by
+  /// which an edge turns about its tangent, parallel transport taken off.
   std::vector<Rates> shape;
   double zero = 0; ///< eigenvalues up to this size are those of motions that cost nothing, to rounding [1/s^2]
 

@@ -2,6 +2,7 @@
 /// \file mode_output.hpp
 /// `-mode modes`: what it cannot do, found before the first step; and natural frequencies told and written.
 
+#include "tendril/dynamics/time_loop.hpp"
 #include "tendril/io/options.hpp"
 #include "tendril/io/progress.hpp"
 
@@ -14,8 +15,12 @@ class Simulation;
 void checkModes(const Scene &scene, const Options &options);
 /// \throws SceneError where the scene has fewer motions with inertia than are asked for
 void refuseTooManyModes(const Simulation &run, int count);
-/// Whether nothing pulls on a scene, so that it rests as drawn even where nothing holds it.
-bool isUnloaded(const Scene &scene);
+/// Whether nothing holds a scene and nothing pulls on it: then it rests by itself.
+bool isAlone(const Scene &scene);
+/// Finds where it rests, in one step: motions that cost nothing and rounding make stability of no use there.
+/// \param failure empty, or why it was not found
+PetscErrorCode settleAlone(Simulation &run, const Options &options, const TimeLoop::Observer &observe, bool *finished,
+                           std::string *failure);
 /// Finds the modes about the last state, tells them and adds /modes to the trajectory, which is complete.
 /// \param exit_code becomes 2 where they could not all be found
 PetscErrorCode tellModes(Simulation &run, const Options &options, Progress &progress, int *exit_code);
