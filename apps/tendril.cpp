@@ -12,6 +12,7 @@
 ///   tendril -options_file options/cases/elastica_accuracy.yaml
 ///   tendril -options_file options/cases/helix.yaml -options_file options/profile.yaml
 ///   tendril -options_file options/cases/column.yaml
+///   tendril -options_file options/cases/hung_spring_modes.yaml
 ///   tendril -options_file options/cases/deep_arch.yaml
 #include "tendril/io/run.hpp"
 

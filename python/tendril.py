@@ -356,6 +356,27 @@ class Joint:
     axis: np.ndarray
 
 
+@dataclass(frozen=True)
+class Modes:
+    """Small motions about the last frame, n from the lowest on: it moves by shape times cos(frequency t), or in one
+    that grows by shape times exp(growth_rate t). Their kinetic energy is that of 1 kg m^2: the shapes are orthonormal by the
+    masses.
+
+    frequency (n,) [rad/s], 0 of motions that cost nothing and of those that grow; growth_rate (n,) [1/s], 0 where the
+    equilibrium is stable; eigenvalue (n,) [1/s^2], their squares, negative of those that grow;
+    shape (n, vertices, 3) [m]; twist (n, edges) [rad], of edges about their tangents, parallel transport taken off;
+    body_shape (n, bodies, 3) [m] of the origins of bodies, body_rotation (n, bodies, 3) [rad], rotation vectors.
+    """
+
+    frequency: np.ndarray
+    growth_rate: np.ndarray
+    eigenvalue: np.ndarray
+    shape: np.ndarray
+    twist: np.ndarray
+    body_shape: np.ndarray
+    body_rotation: np.ndarray
+
+
 class Things(list):
     """Bodies, colliders or tendons by number or name."""
 
@@ -764,6 +785,15 @@ class Trajectory:
         return self._dataset("critical/load_factor")[:]
 
     @property
+    def modes(self):
+        """The Modes of a run with -mode modes; None until it has ended, and of others."""
+        if "modes" not in self._file:
+            return None
+        group = self._file["modes"]
+        none = np.zeros((len(group["frequency"]), 0, 3))
+        return Modes(*(group[name][:] if name in group else none for name in Modes.__dataclass_fields__))
+
+    @property
     def estimate(self):
         """Estimated errors: datasets and attributes of /estimate by name; None until the run has ended with some."""
         if "estimate" not in self._file:
@@ -786,7 +816,7 @@ class Trajectory:
         """Unit of a dataset: a field, column of the diagnostics, parameter of the material; 1 of pure numbers.
         Of equal names a field goes first: `diagnostics/twist` is the energy [J]."""
         groups = ("", "state/", "diagnostics/", "material/", "rods/", "reference/", "critical/", "estimate/",
-                  "bodies/", "skins/")
+                  "modes/", "bodies/", "skins/")
         for path in (group + name for group in groups):
             if isinstance(self._file.get(path), h5py.Dataset):
                 if self.format_version > 1:

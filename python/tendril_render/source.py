@@ -72,6 +72,8 @@ def value(t, name, index, frame):
 
 def title(t, name):
     """What the scale of a field is called."""
+    if name == "time" and hasattr(t, "time_name"):
+        return t.time_name
     if name in (None, *OF_OUR_OWN):
         return "load factor" if name == "time" and is_static(t) else name or ""
     words = name.replace("_", " ")

@@ -271,7 +271,7 @@ private:
     }
     const Rod &host = scene_.rods[std::size_t(joint.rod)];
     const double any = host.material.axial_stiffness / host.length(), size = sizeOf(joint);
-    const double times = step.isStatic() ? stiffer_in_statics : stiffer;
+    const double times = step.isStatic() && !step.small_motions ? stiffer_in_statics : stiffer;
     auto between = [&](double low, double high, double other) {
       return high > 0 ? std::min(times * high, stiffest * (low > 0 ? low : high)) : times * other;
     };

@@ -17,6 +17,7 @@ public:
   void beginStep(const State &, const Configuration &start, const Step &step, int rod) override {
     start_ = &start;
     factor_ = step.load_factor;
+    small_motions_ = step.small_motions;
     for (const JoinedBody &b : elements_.bodies({rod, rod + 1})) {
       Motion &m = bodies_[b.body];
       if (dynamic_) {
@@ -84,7 +85,7 @@ public:
       Mat3 by_turn = curvatureOfArm(pull, arm);
       if (dynamic_)
         by_turn += m.spin.derivative(turnOf(b, *start_, c));
-      else
+      else if (!small_motions_)
         by_turn += neutralStiffness(b.body) * Mat3::Identity();
       for (int i = 0; i < 3; ++i) {
         blocks.vertex(i, i)[b.position] += m.weight;
@@ -112,7 +113,7 @@ private:
   };
   const Scene &scene_;
   const Elements &elements_;
-  bool dynamic_;
+  bool dynamic_, small_motions_ = false;
   std::vector<Motion> bodies_;
   const Configuration *start_ = nullptr;
   double factor_ = 1;

@@ -5,6 +5,7 @@
 #include "tendril/contact/touching_rods.hpp"
 #include "tendril/dynamics/arc_length.hpp"
 #include "tendril/embedding/embedding.hpp"
+#include "tendril/io/mode_output.hpp"
 #include "tendril/io/text.hpp"
 
 #include <algorithm>
@@ -138,7 +139,8 @@ void checkScene(const Scene &scene, const Options &o, std::vector<std::string> *
   if (o.model_check && (!o.restart.empty() || (!o.loop.dynamic && o.loop.continuation == Continuation::arclength)))
     throw SceneError("option -model_check: runs the scene again from its start, in steps of time or load; take "
                      "-restart and -continuation arclength away");
-  if (!o.loop.dynamic) requireHeld(scene);
+  if (o.modes > 0) checkModes(scene, o);
+  if (!o.loop.dynamic && !(o.modes > 0 && isAlone(scene))) requireHeld(scene);
   if (o.loop.dynamic && !scene.rotation.angular_velocity.isZero(0))
     throw SceneError("scene key 'rotation': is for -mode static, a scene at rest in a frame that turns; in dynamics "
                      "let supports turn by their motion");

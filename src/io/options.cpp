@@ -196,10 +196,6 @@ bool isOptionName(const char *word) {
   return word[0] == '-' && (std::isalpha(static_cast<unsigned char>(word[1])) || word[1] == '-');
 }
 
-} // namespace
-
-namespace {
-
 void readTime(Texts &texts, Options *o) {
   if (texts.has("-mode")) o->mode = texts.word("-mode");
   if (texts.has("-dt")) o->dt = texts.number("-dt");
@@ -220,6 +216,8 @@ void readTime(Texts &texts, Options *o) {
 }
 
 void readStatics(Texts &texts, Options *o) {
+  o->modes_given = texts.has("-modes");
+  o->modes = texts.integer("-modes");
   if (texts.has("-load_steps")) o->given_load_steps = texts.integer("-load_steps");
   if (texts.has("-arclength_steps")) o->arclength_steps = texts.integer("-arclength_steps");
   o->loop.arclength_steps = texts.integer("-arclength_steps");
@@ -325,7 +323,10 @@ void checkAccuracy(const Options &o) {
 } // namespace
 
 void resolve(const RunSettings &scene, Options &o) {
-  o.loop.dynamic = o.mode.value_or(scene.mode) == "dynamic";
+  const std::string mode = o.mode.value_or(scene.mode), no_meaning = "has no meaning in -mode " + mode;
+  o.loop.dynamic = mode == "dynamic";
+  if (mode != "modes" && o.modes_given) fail("modes", no_meaning + "; use -mode modes");
+  if (mode != "modes") o.modes = 0;
   o.load_steps = o.given_load_steps.value_or(scene.load_steps);
   if (o.loop.dynamic) {
     if (o.given_load_steps) fail("load_steps", "has no meaning in -mode dynamic; use -dt");
@@ -340,17 +341,16 @@ void resolve(const RunSettings &scene, Options &o) {
       fail("dt", "a step of " + shortText(o.loop.dt) + " s never reaches the end at " + shortText(o.loop.t_end) +
                      " s; write a larger dt or a smaller t_end");
   } else {
-    if (o.dt) fail("dt", "has no meaning in -mode static; use -load_steps");
-    if (o.t_end) fail("t_end", "has no meaning in -mode static; the load factor ends at 1");
-    if (!o.dynamic_only.empty()) fail(o.dynamic_only, "has no meaning in -mode static");
+    if (o.dt) fail("dt", no_meaning + "; use -load_steps");
+    if (o.t_end) fail("t_end", no_meaning + "; the load factor ends at 1");
+    if (!o.dynamic_only.empty()) fail(o.dynamic_only, no_meaning);
     o.loop.t_end = 1;
     o.loop.dt = 1.0 / o.load_steps;
     const bool arclength = o.loop.continuation == Continuation::arclength;
     if (o.arclength_steps && !arclength) fail("arclength_steps", "needs -continuation arclength");
   }
   if (o.restart_time && o.restart.empty()) fail("restart_time", "needs -restart");
-  if (o.restart_time && !o.loop.dynamic)
-    fail("restart_time", "has no meaning in -mode static, where time is the load factor");
+  if (o.restart_time && !o.loop.dynamic) fail("restart_time", no_meaning + ", where time is the load factor");
   checkAccuracy(o);
   if (o.loop.dt_min > o.loop.dt) fail("dt_min", "must not be larger than the step " + shortText(o.loop.dt));
   if (o.loop.dt_max > 0 && o.loop.dt_min > o.loop.dt_max)

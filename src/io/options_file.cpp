@@ -45,7 +45,8 @@ private:
   }
 
   void putTime() {
-    put("mode", o.loop.dynamic ? "dynamic" : "static");
+    put("mode", o.modes > 0 ? "modes" : o.loop.dynamic ? "dynamic" : "static");
+    if (o.modes > 0) put("modes", o.modes);
     if (o.loop.dynamic) {
       put("dt", o.loop.dt);
       put("t_end", o.loop.t_end);

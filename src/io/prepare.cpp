@@ -92,6 +92,7 @@ static Scene sceneFor(Prepared &prepared, Options &o) {
   prepared.notes = std::move(file.notes);
   if (o.gravity) file.scene.gravity = *o.gravity;
   resolve(file.run, o);
+  for (Rod &rod : file.scene.rods) rod.chooses_model = rod.chooses_model && o.modes == 0; // modes are in all directions
   settleModels(file.scene, o.loop.dynamic,
                Team::world().isAlone() && (o.loop.dynamic || o.loop.continuation == Continuation::load),
                &prepared.notes);

@@ -5,6 +5,7 @@
 #include "tendril/dynamics/simulation.hpp"
 #include "tendril/io/estimate_writer.hpp"
 #include "tendril/io/keys.hpp"
+#include "tendril/io/mode_output.hpp"
 #include "tendril/io/option_files.hpp"
 #include "tendril/io/options.hpp"
 #include "tendril/io/prepare.hpp"
@@ -116,7 +117,9 @@ PetscErrorCode march(Prepared &prepared, TimeLoop &loop, const Options &o, const
   auto critical = [&](const CriticalPoint &point) { return recorder.noteCritical(point); };
   auto stops = [&] { return request.asked(); };
   PetscCall(PetscLogStagePush(events().run));
-  if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength) {
+  if (o.modes > 0 && isAlone(run.scene)) {
+    PetscCall(settleAlone(run, o, observe, finished, failure));
+  } else if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength) {
     ArcLength path(run.solver, o.loop);
     path.on_critical = critical;
     path.stops = stops;
@@ -249,6 +252,7 @@ PetscErrorCode runPrepared(Prepared &prepared, int argc, char **argv, const Opti
   if (finished && o.error_estimate && o.loop.dynamic) tellTimeError(recorder.last(), o, progress);
   if (finished && o.error_estimate && !o.loop.dynamic)
     PetscCall(tellError(prepared, recorder.last().rounding_error, recorder.criticalFactors(), o, progress));
+  if (finished && o.modes > 0) PetscCall(tellModes(run, o, progress, exit_code));
   PetscFunctionReturn(0);
 }
 
@@ -270,6 +274,7 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   if (!prepared.team.isEmpty()) PetscCall(findUnused(prepared.team, prepared.run->scene.touchesMoving(), &unknown));
   world.together([&] {
     if (!unknown.empty()) refuseUnused(unknown);
+    if (o.modes > 0) refuseTooManyModes(*prepared.run, o.modes);
     if (!world.leads()) return;
     begun.folder.emplace(o.output_dir);
     std::vector<std::string> inputs = files.files();

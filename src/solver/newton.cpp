@@ -110,7 +110,7 @@ PetscErrorCode NewtonSolver::refill() {
   if (banded_)
     PetscCall(PetscObjectStateIncrease((PetscObject)jacobian_.object()));
   else {
-    EdgeBlocks blocks = potential_->blocks();
+    EdgeBlocks blocks = *system_.blocks;
     for (int r = rods_.begin; r < rods_.end; ++r) {
       const RodRange &rod = potential_->elements().rods[r];
       for (int a = 0; a < slot_size && work_->shift[r] != 0; ++a) {

@@ -31,6 +31,8 @@ struct Options {
   LoopSettings loop;
   PartitionKind partition = PartitionKind::automatic;
   int load_steps = 1;
+  bool modes_given = false;
+  int modes = 0; ///< natural frequencies to find about the equilibrium; 0 in other modes
   std::optional<Vec3> gravity;
   std::vector<std::pair<std::string, int>> rod_edges; ///< by names of rods, in order of the command line
   std::string output_dir = "out";

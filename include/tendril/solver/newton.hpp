@@ -130,6 +130,14 @@ public:
   /// higher lift than `lift`, which then is that lift. The edge that turns most turns by one radian. \see
   /// inertiaAtIterate
   PetscErrorCode criticalMode(int stable, double *lift, Planes *mode);
+  /// Rods that nothing joins to others.
+  const std::vector<RodSet> &islands() const { return islands_; }
+  /// Factors the Hessian at the iterate plus a multiple of the mass matrix (mass.hpp) of one island, in place of all:
+  /// solveLinear gives other rods zero. \param factor of the masses [1/s^2] \param negative receives the number of
+  /// eigenvalues of the pair below -factor, -1 where one is there to rounding, or the matrix cannot be factored
+  PetscErrorCode factorWithMass(RodSet island, double factor, int *negative);
+  /// The square of about the frequency of the slowest bending wave of an island's rods [1/s^2].
+  double slowestBending(RodSet island) const { return firstShift(island); }
   /// Solves with the matrix factored last.
   PetscErrorCode solveLinear(const Planes &right, Planes &solution);
 

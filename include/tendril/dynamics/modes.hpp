@@ -1,0 +1,37 @@
+#pragma once
+/// \file modes.hpp
+/// Small motions about an equilibrium: K phi = omega^2 M phi, K the Hessian of the potential there and M the mass
+/// matrix (solver/mass.hpp), without damping. Krylov-Schur (Stewart 2001, in SLEPc) on (K - s M)^-1 M with a shift s
+/// below all eigenvalues and the factorisation that Newton has, which keeps the digits of fine rods; the inertia of K -
+/// t M with t just above the last eigenvalue counts whether any is missing (Sylvester).
+
+#include "tendril/solver/step_solver.hpp"
+
+namespace tendril {
+
+/// The lowest modes, from the lowest on; n of them.
+struct Modes {
+  std::vector<double> eigenvalue; ///< (n) omega^2; negative where the equilibrium is unstable [1/s^2]
+  /// (n) Displacements, twists, and displacements of centres of mass and rotation vectors of bodies, with phi' M phi =
+  /// 1 kg m^2; of both signs that with a positive largest displacement, or twist where nothing is displaced. Twist: by
+  /// which an edge turns about its tangent, parallel transport taken off.
+  std::vector<Rates> shape;
+  double zero = 0; ///< eigenvalues up to this size are those of motions that cost nothing, to rounding [1/s^2]
+
+  int count() const { return int(eigenvalue.size()); }
+  bool isFree(int k) const { return std::abs(eigenvalue[std::size_t(k)]) <= zero; }
+  bool isUnstable(int k) const { return eigenvalue[std::size_t(k)] < -zero; }
+  double frequency(int k) const;  ///< 0 of free and unstable ones [rad/s]
+  double growthRate(int k) const; ///< of unstable ones, or 0 [1/s]
+};
+
+/// Number of motions that have a frequency.
+int massRank(const IncrementalPotential &potential);
+
+/// Finds the lowest modes about an equilibrium, whose forces are balanced once more first as well as rounding allows.
+/// \param count of modes, at most massRank \param step settings of a static step; its load and time are those of the
+/// state \param failure empty, or why not all could be told apart
+PetscErrorCode findModes(StepSolver &solver, const State &state, Step step, int count, Modes *modes,
+                         std::string *failure);
+
+} // namespace tendril

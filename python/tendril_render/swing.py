@@ -1,0 +1,76 @@
+"""A vibration about an equilibrium as frames to draw."""
+import numpy as np
+from tendril import edge_frames
+
+from .source import Mistake
+
+TURN = 0.5  # of an edge or body that turns most, where nothing moves [rad]
+
+
+def turned(vectors, axes, angles):
+    """Vectors (..., 3) turned about unit axes by angles (Rodrigues)."""
+    cos, sin = np.cos(angles)[..., None], np.sin(angles)[..., None]
+    along = np.sum(axes * vectors, -1, keepdims=True)
+    return cos * vectors + sin * np.cross(axes, vectors) + (1 - cos) * along * axes
+
+
+class Swing:
+    """A trajectory whose frames are a mode about its last one, with the deflections in `time`; the rest is as there."""
+
+    time_name = "deflection"
+
+    def __init__(self, t, number, share, deflections):
+        """number: of the mode, from 1; share: the largest displacement over the size of all."""
+        modes = t.modes
+        if modes is None:
+            raise Mistake("--mode: this run has no modes; run it with -mode modes")
+        if not 1 <= number <= len(modes.frequency):
+            raise Mistake(f"--mode {number}: the run has modes 1 to {len(modes.frequency)}")
+        k = number - 1
+        rate = modes.growth_rate[k]
+        self.words = f"mode {number}: " + (f"grows by {rate:.4g}/s" if rate > 0 else f"{modes.frequency[k]:.4g} rad/s")
+        self._t, self.time = t, np.asarray(deflections, float)
+        moved = [np.linalg.norm(v, axis=-1).max(initial=0) for v in (modes.shape[k], modes.body_shape[k])]
+        spun = [np.abs(modes.twist[k]).max(initial=0), np.linalg.norm(modes.body_rotation[k], axis=-1).max(initial=0)]
+        size = np.linalg.norm(np.ptp(t.field("position")[-1], axis=0))
+        only_turns = max(moved) < 1e-6 * size * max(spun)
+        scale = TURN / max(spun) if only_turns else share * size / max(moved)
+        self._shape, self._twist = scale * modes.shape[k], scale * modes.twist[k]
+        self._body_shape, self._body_rotation = scale * modes.body_shape[k], scale * modes.body_rotation[k]
+        self.rods = [self._rod(rod) for rod in t.rods]
+        self.bodies = [self._body(body) for body in t.bodies]
+
+    def __getattr__(self, name):
+        return getattr(self._t, name)
+
+    def _rod(self, rod):
+        x, d = rod.position(), rod.director()
+        shape = self._shape[rod.first_vertex : rod.first_vertex + rod.vertices]
+        twist = self._twist[rod.first_edge : rod.first_edge + rod.edges]
+        before, field = edge_frames(x, d)[2], rod.field
+
+        def director(frame=-1):
+            after = edge_frames(rod.position(frame), d)[2]
+            axis = np.cross(before, after)
+            sine = np.linalg.norm(axis, axis=-1, keepdims=True)
+            bent = turned(d, axis / np.maximum(sine, 1e-300), np.arctan2(sine[..., 0], np.sum(before * after, -1)))
+            return turned(bent, after, self.time[frame] * twist)
+
+        rod.position = lambda frame=-1: x + self.time[frame] * shape
+        rod.director = director
+        rod.field = lambda name, frame=-1: field(name)
+        return rod
+
+    def _body(self, body):
+        (x, q), k = body.pose(), body.index
+
+        def pose(frame=-1):
+            spin = self.time[frame] * self._body_rotation[k]
+            angle = np.linalg.norm(spin)
+            axis = spin / max(angle, 1e-300) * np.sin(angle / 2)
+            w = np.cos(angle / 2)
+            product = [w * q[0] - axis @ q[1:], *(w * q[1:] + q[0] * axis + np.cross(axis, q[1:]))]
+            return x + self.time[frame] * self._body_shape[k], np.array(product)
+
+        body.pose = pose
+        return body

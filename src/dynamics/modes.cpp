@@ -1,0 +1,321 @@
+#include "tendril/dynamics/modes.hpp"
+
+#include "tendril/dynamics/bifurcation.hpp"
+#include "tendril/solver/activity.hpp"
+#include "tendril/solver/mass.hpp"
+
+#include <slepceps.h>
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+
+namespace tendril {
+
+double Modes::frequency(int k) const { return isFree(k) ? 0 : std::sqrt(std::max(eigenvalue[std::size_t(k)], 0.0)); }
+
+double Modes::growthRate(int k) const { return isFree(k) ? 0 : std::sqrt(std::max(-eigenvalue[std::size_t(k)], 0.0)); }
+
+int massRank(const IncrementalPotential &potential) { return massRank(potential, potential.all()); }
+
+namespace {
+
+using OwnedEPS = Owned<EPS, EPSDestroy>;
+
+constexpr double residual_tolerance = 1e-10; // of eigenvectors: eigenvalues are right to its square over their distance
+constexpr double free_part = 1e-10, stretch_part = 300 * epsilon; // of the shift; of EA/(rho L^2)
+
+/// SLEPc, which has no use for the command line, until PETSc ends.
+PetscErrorCode startSlepc() {
+  PetscBool started;
+  PetscFunctionBeginUser;
+  PetscCall(SlepcInitialized(&started));
+  if (!started) PetscCall(SlepcInitializeNoArguments());
+  if (!started) PetscCall(PetscRegisterFinalize(SlepcFinalize));
+  PetscFunctionReturn(0);
+}
+
+/// The modes of one island, of which nothing moves others.
+class IslandModes {
+public:
+  /// \param work right-hand sides and solutions of the block, which its islands share
+  IslandModes(NewtonSolver &block, const IncrementalPotential &potential, RodSet island, std::array<Planes, 2> &work)
+      : block_(block), potential_(potential), island_(island), right_(work[0]), solution_(work[1]) {}
+
+  PetscErrorCode find(int count, std::string *failure);
+  /// From the lowest on.
+  std::vector<double> eigenvalues() const;
+  PetscErrorCode shape(int k, Rates *out);
+  double zero() const; ///< \see Modes
+
+  // What SLEPc calls.
+  PetscErrorCode applyMass(Vec x, Vec y);
+  PetscErrorCode applyInverse(Vec x, Vec y);
+
+private:
+  struct Mode {
+    double eigenvalue;
+    OwnedVec vector;
+  };
+  NewtonSolver &block_;
+  const IncrementalPotential &potential_;
+  RodSet island_;
+  Planes &right_, &solution_;
+  double shift_ = 0; ///< s = -shift_, below all eigenvalues [1/s^2]
+  std::vector<Mode> found_;
+
+  PetscErrorCode countBelow(double value, int *count) { return block_.factorWithMass(island_, -value, count); }
+  PetscErrorCode chooseShift(int count);
+  PetscErrorCode search(int count);
+  PetscErrorCode isComplete(int count, int *missing);
+};
+
+PetscErrorCode massCallback(Mat m, Vec x, Vec y) {
+  IslandModes *modes;
+  PetscFunctionBeginUser;
+  PetscCall(MatShellGetContext(m, &modes));
+  PetscCall(modes->applyMass(x, y));
+  PetscFunctionReturn(0);
+}
+
+/// In place of K, which SLEPc multiplies by only to ask whether modes that it leaves out are in the null space of
+/// K - s M: none is.
+PetscErrorCode stiffnessCallback(Mat, Vec x, Vec y) { return VecCopy(x, y); }
+
+PetscErrorCode inverseCallback(PC pc, Vec x, Vec y) {
+  IslandModes *modes;
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &modes));
+  PetscCall(modes->applyInverse(x, y));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode IslandModes::applyMass(Vec x, Vec y) {
+  PetscFunctionBeginUser;
+  PetscCall(potential_.dofs().scatter(x, island_, solution_));
+  multiplyMass(potential_, island_, solution_, right_);
+  PetscCall(potential_.dofs().gather(right_, island_, y));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode IslandModes::applyInverse(Vec x, Vec y) {
+  PetscFunctionBeginUser;
+  watch().beat();
+  PetscCall(potential_.dofs().scatter(x, island_, right_));
+  PetscCall(block_.solveLinear(right_, solution_));
+  PetscCall(potential_.dofs().gather(solution_, island_, y));
+  PetscFunctionReturn(0);
+}
+
+/// Of about the size of the largest eigenvalue that is asked for, by the inertia: far below it, iterations are many and
+/// digits of the upper ones are lost, far above it those of the lower ones. And below all eigenvalues.
+PetscErrorCode IslandModes::chooseShift(int count) {
+  constexpr int most = 60, most_down = 9; // beyond, as many motions cost nothing
+  constexpr double factor = 16;
+  PetscFunctionBeginUser;
+  const double first = shift_ = block_.slowestBending(island_);
+  int below;
+  PetscCall(countBelow(shift_, &below));
+  const bool goes_down = below >= count;
+  for (int k = 0; k < most && below >= 0 && (below >= count) == goes_down; ++k) {
+    const double next = goes_down ? shift_ / factor : shift_ * factor;
+    PetscCall(countBelow(next, &below));
+    if (!goes_down || below >= count) shift_ = next;
+    if (goes_down && k == most_down) {
+      shift_ = first;
+      break;
+    }
+  }
+  for (int k = 0; k < most; ++k) {
+    PetscCall(countBelow(-shift_, &below));
+    if (below == 0) break;
+    shift_ *= factor;
+  }
+  PetscFunctionReturn(0);
+}
+
+/// Adds so many of the lowest modes beside those that are known.
+PetscErrorCode IslandModes::search(int count) {
+  OwnedEPS eps;
+  OwnedMat stiffness, mass;
+  ST st;
+  KSP ksp;
+  PC pc;
+  int negative;
+  PetscFunctionBeginUser;
+  const PetscInt n = potential_.dofs().unknowns(island_);
+  PetscCall(countBelow(-shift_, &negative)); // its factor is what applyInverse solves with
+  for (OwnedMat *m : {&stiffness, &mass}) PetscCall(MatCreateShell(PETSC_COMM_SELF, n, n, n, n, this, m->out()));
+  PetscCall(MatShellSetOperation(mass, MATOP_MULT, (void (*)(void))massCallback));
+  PetscCall(MatShellSetOperation(stiffness, MATOP_MULT, (void (*)(void))stiffnessCallback));
+  PetscCall(EPSCreate(PETSC_COMM_SELF, eps.out()));
+  PetscCall(EPSSetOperators(eps, stiffness, mass));
+  PetscCall(EPSSetProblemType(eps, EPS_GHEP));
+  PetscCall(EPSGetST(eps, &st));
+  PetscCall(STSetType(st, STSINVERT));
+  PetscCall(STSetMatMode(st, ST_MATMODE_SHELL)); // the factor is ours, and no matrix is formed
+  PetscCall(STSetShift(st, -shift_));
+  PetscCall(STGetKSP(st, &ksp));
+  PetscCall(KSPSetType(ksp, KSPPREONLY));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PCSetType(pc, PCSHELL));
+  PetscCall(PCShellSetContext(pc, this));
+  PetscCall(PCShellSetApply(pc, inverseCallback));
+  PetscCall(EPSSetTarget(eps, -shift_));
+  PetscCall(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE));
+  PetscCall(EPSSetDimensions(eps, count, PetscMin(n, 2 * count + 20), PETSC_DEFAULT));
+  PetscCall(EPSSetTolerances(eps, residual_tolerance, 200));
+  std::vector<Vec> known;
+  for (const Mode &m : found_) known.push_back(m.vector);
+  if (!known.empty()) PetscCall(EPSSetDeflationSpace(eps, PetscInt(known.size()), known.data()));
+  PetscCall(EPSSolve(eps));
+  PetscInt converged;
+  PetscCall(EPSGetConverged(eps, &converged));
+  for (PetscInt k = 0; k < converged; ++k) {
+    Mode mode;
+    PetscCall(MatCreateVecs(mass, mode.vector.out(), nullptr));
+    PetscCall(EPSGetEigenpair(eps, k, &mode.eigenvalue, nullptr, mode.vector, nullptr));
+    found_.push_back(std::move(mode));
+  }
+  std::stable_sort(found_.begin(), found_.end(),
+                   [](const Mode &a, const Mode &b) { return a.eigenvalue < b.eigenvalue; });
+  PetscFunctionReturn(0);
+}
+
+/// How many eigenvalues up to the last that is asked for are not among those found, by the inertia just above it.
+PetscErrorCode IslandModes::isComplete(int count, int *missing) {
+  PetscFunctionBeginUser;
+  *missing = std::max(0, count - int(found_.size()));
+  if (*missing > 0) PetscFunctionReturn(0);
+  const double last = found_[std::size_t(count) - 1].eigenvalue;
+  for (const double gap : {1e-8, 1e-7, 1e-6}) { // beside an eigenvalue the count is rounding
+    const double above = last + gap * (last + shift_);
+    int below;
+    PetscCall(countBelow(above, &below));
+    const auto known = std::count_if(found_.begin(), found_.end(), [&](const Mode &m) { return m.eigenvalue < above; });
+    *missing = below - int(known);
+    if (below >= 0 && *missing >= 0) break;
+    *missing = 1;
+  }
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode IslandModes::find(int count, std::string *failure) {
+  constexpr int most_rounds = 8;
+  PetscFunctionBeginUser;
+  const int rank = massRank(potential_, island_);
+  count = std::min(count, rank);
+  if (count == 0) PetscFunctionReturn(0);
+  PetscCall(chooseShift(count));
+  int missing = count;
+  for (int round = 0; round < most_rounds && missing > 0; ++round) {
+    PetscCall(search(std::min(missing + 1, rank - int(found_.size())))); // one more: it may be as low as the last
+    PetscCall(isComplete(count, &missing));
+  }
+  if (missing > 0)
+    *failure = "of " + std::to_string(count) + " modes " + std::to_string(missing) +
+               " could not be found: the inertia of the factored matrix counts more eigenvalues below the last than "
+               "there are modes; ask for another number of -modes, or take other -rod_edges";
+  found_.resize(std::min(found_.size(), std::size_t(count)));
+  PetscFunctionReturn(0);
+}
+
+/// What Newton leaves of the balance of forces, and rounding of stiff edges, whose directions are off by an epsilon.
+double IslandModes::zero() const {
+  double stretch = 0;
+  for (int r = island_.begin; r < island_.end; ++r) {
+    const Material &m = potential_.scene().rods[std::size_t(r)].material;
+    const double length = potential_.length(r);
+    if (!m.isCable()) stretch = std::max(stretch, m.axial_stiffness / (m.linear_density * length * length));
+  }
+  return std::max(free_part * shift_, stretch_part * stretch);
+}
+
+std::vector<double> IslandModes::eigenvalues() const {
+  std::vector<double> values;
+  for (const Mode &m : found_) values.push_back(m.eigenvalue);
+  return values;
+}
+
+PetscErrorCode IslandModes::shape(int k, Rates *out) {
+  const Elements &e = potential_.elements();
+  PetscFunctionBeginUser;
+  PetscCall(potential_.dofs().scatter(found_[std::size_t(k)].vector, island_, solution_));
+  multiplyMass(potential_, island_, solution_, right_);
+  out->vertex.assign(std::size_t(e.vertices()), Vec3::Zero());
+  out->edge.assign(std::size_t(e.edges()), 0.0);
+  out->body.assign(std::size_t(e.bodyCount()), BodyRate());
+  double largest = 0, most_twisted = 0, length = 0;
+  auto note = [&](const Vec3 &moved) {
+    for (const double d : moved)
+      if (std::abs(d) > std::abs(largest) * (1 + 1e-6)) largest = d;
+    return moved;
+  };
+  for (int r = island_.begin; r < island_.end; ++r) {
+    const RodRange &rod = e.rods[std::size_t(r)];
+    for (int i = 0; i < rod.vertices; ++i)
+      out->vertex[std::size_t(rod.first_vertex + i)] = note(solution_.vector(0, rod.slot(i)));
+    for (int i = 0; i < rod.edges; ++i) {
+      const double twist = out->edge[std::size_t(rod.first_edge + i)] = solution_[3][rod.slot(i)];
+      if (std::abs(twist) > std::abs(most_twisted) * (1 + 1e-6)) most_twisted = twist;
+    }
+    length += e.length(r);
+    for (const JoinedBody &b : e.bodies({r, r + 1}))
+      out->body[std::size_t(b.body)] = {note(solution_.vector(0, b.position)), solution_.vector(0, b.rotation),
+                                        Vec3::Zero()};
+  }
+  if (std::abs(largest) < 1e-6 * length * std::abs(most_twisted)) largest = most_twisted; // it only twists
+  const double size = std::copysign(1 / std::sqrt(potential_.dofs().dot(island_, right_, solution_)), largest);
+  for (Vec3 &v : out->vertex) v *= size;
+  for (double &t : out->edge) t *= size;
+  for (BodyRate &b : out->body) b = BodyRate().add(size, b);
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode findModes(StepSolver &solver, const State &state, Step step, int count, Modes *modes,
+                         std::string *failure) {
+  PetscFunctionBeginUser;
+  PetscCall(startSlepc());
+  const Doing here([](std::ostream &out) { out << "natural frequencies are found"; });
+  step.time = step.load_factor = state.time;
+  step.small_motions = true;
+  NewtonReport report;
+  {
+    const SharpTolerance sharp(solver);
+    PetscCall(solver.solve(state, step, &report, Seek::equilibrium));
+  }
+  if (!report.converged) PetscCall(solver.begin(state, step)); // rounding leaves no better one
+  *modes = {};
+  std::vector<IslandModes> islands;
+  struct Place {
+    double eigenvalue;
+    std::size_t island;
+    int number;
+  };
+  std::vector<Place> all;
+  std::deque<std::array<Planes, 2>> work;
+  for (NewtonSolver &block : solver.blocks()) {
+    Planes planes(slot_size, solver.potential().dofs().slots(block.rods()));
+    planes.setOrigin(solver.potential().elements().rods[std::size_t(block.rods().begin)].first_slot);
+    work.push_back({planes, planes});
+    for (const RodSet island : block.islands()) {
+      IslandModes &one = islands.emplace_back(block, solver.potential(), island, work.back());
+      PetscCall(one.find(count, failure));
+      if (!failure->empty()) PetscFunctionReturn(0);
+      const std::vector<double> values = one.eigenvalues();
+      for (std::size_t k = 0; k < values.size(); ++k) all.push_back({values[k], islands.size() - 1, int(k)});
+      modes->zero = std::max(modes->zero, one.zero());
+    }
+  }
+  std::stable_sort(all.begin(), all.end(), [](const Place &a, const Place &b) { return a.eigenvalue < b.eigenvalue; });
+  all.resize(std::min(all.size(), std::size_t(count)));
+  for (const Place &p : all) {
+    modes->eigenvalue.push_back(p.eigenvalue);
+    PetscCall(islands[p.island].shape(p.number, &modes->shape.emplace_back()));
+  }
+  PetscFunctionReturn(0);
+}
+
+} // namespace tendril

@@ -1,0 +1,152 @@
+#include "tendril/io/mode_output.hpp"
+
+#include "tendril/dynamics/modes.hpp"
+#include "tendril/dynamics/simulation.hpp"
+#include "tendril/io/hdf5.hpp"
+
+#include <algorithm>
+#include <iomanip>
+#include <sstream>
+
+namespace tendril {
+namespace {
+
+[[noreturn]] void refuse(const std::string &what) { throw SceneError("option -mode modes: " + what); }
+
+/// Loads and contact that have no potential: their frequencies would be those of a matrix that is not symmetric.
+void refuseUnsymmetric(const Scene &scene) {
+  const std::string unsymmetric = " has no potential, and a problem that is not symmetric is not supported yet; ",
+                    friction = "friction" + unsymmetric + "write 'contact: {friction: 0}'";
+  for (const EdgeMoment &m : scene.moments)
+    refuse("the " + std::string(m.moment.isZero(0) ? "'torque'" : "'moment'") + " on edge " + std::to_string(m.edge) +
+           " of " + labelOf(scene.rods[std::size_t(m.rod)]) + unsymmetric + "turn a clamp in its place");
+  for (const Body &b : scene.bodies)
+    if (!b.torque.isZero(0))
+      refuse("the 'torque' on body '" + b.name + "'" + unsymmetric + "turn a joint in its place");
+  const bool touch = !scene.colliders.empty();
+  for (const Rod &rod : scene.rods)
+    if (rod.contact.on && rod.contact.friction > 0 && (touch || rod.contact.touchesMoving()))
+      refuse(labelOf(rod) + ": " + friction);
+  for (const Body &b : scene.bodies)
+    if (b.contact.on && b.contact.friction > 0 && (touch || b.contact.touchesMoving()))
+      refuse("body '" + b.name + "': " + friction);
+}
+
+std::string lineOf(const Modes &modes, int k) {
+  std::ostringstream line;
+  line << "mode " << k + 1 << ": " << std::setprecision(10);
+  if (modes.isUnstable(k))
+    line << "unstable, grows as exp(" << modes.growthRate(k) << "/s t)";
+  else if (modes.isFree(k))
+    line << "0 rad/s, a motion that costs nothing";
+  else
+    line << modes.frequency(k) << " rad/s, " << std::setprecision(6) << modes.frequency(k) / (2 * pi) << " Hz";
+  return line.str();
+}
+
+/// Of body k's origin in the mode, with its rotation vector; of those that no step moves zero.
+void addBodies(const Simulation &run, const Rates &shape, std::vector<double> &moved, std::vector<double> &turned) {
+  const int count = int(run.scene.bodies.size());
+  for (int b = 0; b < count + int(run.scene.held_bodies.size()); ++b) {
+    Vec3 translation = Vec3::Zero(), spin = Vec3::Zero();
+    if (b < count) {
+      const BodyRate &rate = shape.body[std::size_t(b)];
+      const Vec3 arm = rotationOf(run.state, run.elements->groups - count + b) *
+                       (run.scene.bodies[std::size_t(b)].position - run.elements->bodyMass(b).centre);
+      spin = rate.spin;
+      translation = rate.translation + spin.cross(arm);
+    }
+    moved.insert(moved.end(), translation.begin(), translation.end());
+    turned.insert(turned.end(), spin.begin(), spin.end());
+  }
+}
+
+void writeModes(const std::string &path, const Simulation &run, const Modes &modes) {
+  Hdf5File file = Hdf5File::reopen(path);
+  std::vector<double> frequency, growth, shape, twist, moved, turned;
+  for (int k = 0; k < modes.count(); ++k) {
+    frequency.push_back(modes.frequency(k));
+    growth.push_back(modes.growthRate(k));
+    const Rates &one = modes.shape[std::size_t(k)];
+    for (const Vec3 &v : one.vertex) shape.insert(shape.end(), v.begin(), v.end());
+    twist.insert(twist.end(), one.edge.begin(), one.edge.end());
+    addBodies(run, one, moved, turned);
+  }
+  const hsize_t n = hsize_t(modes.count()), bodies = moved.size() / 3 / n;
+  file.createGroup("modes");
+  file.write("modes/frequency", {n}, frequency.data(), "rad/s");
+  file.write("modes/growth_rate", {n}, growth.data(), "1/s");
+  file.write("modes/eigenvalue", {n}, modes.eigenvalue.data(), "1/s^2");
+  file.write("modes/shape", {n, shape.size() / 3 / n, 3}, shape.data(), "m");
+  file.write("modes/twist", {n, twist.size() / n}, twist.data(), "rad");
+  if (bodies > 0) file.write("modes/body_shape", {n, bodies, 3}, moved.data(), "m");
+  if (bodies > 0) file.write("modes/body_rotation", {n, bodies, 3}, turned.data(), "rad");
+  file.close();
+}
+
+} // namespace
+
+void checkModes(const Scene &scene, const Options &o) {
+  if (const int ranks = Team::world().size(); ranks > 1)
+    refuse("runs on one rank, and mpiexec has started " + std::to_string(ranks) + "; start tendril without it");
+  if (!o.restart.empty()) refuse("begins with the scene; take -restart away");
+  if (o.loop.bifurcation == Bifurcation::stop)
+    refuse("is about the equilibrium at full load, and -bifurcation stop ends before; take locate or switch");
+  if (!scene.rotation.angular_velocity.isZero(0))
+    refuse("the scene has a 'rotation': Coriolis forces act there, and gyroscopic problems are not supported yet");
+  refuseUnsymmetric(scene);
+}
+
+void refuseTooManyModes(const Simulation &run, int count) {
+  if (const int most = massRank(*run.potential); count > most)
+    throw SceneError("option -modes: " + std::to_string(count) + " are asked for, and the scene has " +
+                     std::to_string(most) + " motions with inertia; write at most that, or raise -rod_edges");
+}
+
+bool isAlone(const Scene &scene) {
+  return std::none_of(scene.supports.begin(), scene.supports.end(),
+                      [](const Support &s) { return s.holdsPosition(); }) &&
+         scene.gravity.isZero(0) && scene.forces.empty() && scene.moments.empty() && scene.tendons.empty() &&
+         scene.constraints.empty() && scene.joints.empty() && scene.colliders.empty() && !scene.touchesMoving() &&
+         std::all_of(scene.bodies.begin(), scene.bodies.end(), [](const Body &b) { return b.force.isZero(0); });
+}
+
+PetscErrorCode settleAlone(Simulation &run, const Options &o, const TimeLoop::Observer &observe, bool *finished,
+                           std::string *failure) {
+  PetscFunctionBeginUser;
+  NewtonReport report;
+  PetscCall(run.solver.solve(run.state, TimeLoop::stepOf(o.loop, run.state, 1), &report, Seek::equilibrium));
+  *finished = report.converged;
+  if (!*finished) *failure = "the rest state of a scene that nothing holds was not found: " + report.reason;
+  if (!*finished) PetscFunctionReturn(0);
+  run.potential->commit(run.state);
+  Diagnostics row;
+  row.time = row.dt = 1;
+  row.newton_iterations = report.iterations;
+  row.energy = energyBudget(run.scene, *run.elements, run.state, 1);
+  PetscCall(observe(run.state, row));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode tellModes(Simulation &run, const Options &o, Progress &progress, int *exit_code) {
+  PetscFunctionBeginUser;
+  if (run.state.time < o.loop.t_end) {
+    progress.fail("-mode modes: the path of equilibria has not come to full load, about which modes are found");
+    *exit_code = 2;
+    PetscFunctionReturn(0);
+  }
+  Modes modes;
+  std::string failure;
+  PetscCall(
+      findModes(run.solver, run.state, TimeLoop::stepOf(o.loop, run.state, o.loop.dt), o.modes, &modes, &failure));
+  if (!failure.empty()) {
+    progress.fail("-mode modes: " + failure);
+    *exit_code = 2;
+    PetscFunctionReturn(0);
+  }
+  writeModes(o.output_dir + "/trajectory.h5", run, modes);
+  for (int k = 0; k < modes.count(); ++k) progress.say(lineOf(modes, k));
+  PetscFunctionReturn(0);
+}
+
+} // namespace tendril
