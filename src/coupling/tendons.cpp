@@ -2,9 +2,9 @@
 /// displacement included, as blocks of pairs: no tendon is a column of its own, and slack ones cost what taut ones do.
 /// The tension of a stiff tendon is an unknown of its own, as the axial force of an edge is: what the linearised
 /// displacement asks for. So a step that a stiff tendon begins far from its tension is not lost in what that tension,
-/// many times too large, would do by the curvature of its path.
+/// many times too large, would do by the curvature of its path. Friction adds to that tension part by part (Capstan).
 #include "tendril/coupling/couplings.hpp"
-#include "tendril/energy/tendon.hpp"
+#include "tendril/energy/capstan.hpp"
 
 namespace tendril {
 namespace {
@@ -12,9 +12,11 @@ namespace {
 class Tendons final : public Term {
 public:
   Tendons(const Scene &scene, const Elements &elements)
-      : elements_(elements), work_(scene.tendons.size()), by_rod_(scene.tendons, elements.rods.size()) {
+      : scene_(scene), elements_(elements), work_(scene.tendons.size()), by_rod_(scene.tendons, elements.rods.size()) {
+    paths_.reserve(scene.tendons.size()); // capstans have their places
     for (int k = 0; k < int(scene.tendons.size()); ++k) {
       const TendonPath &path = paths_.emplace_back(scene, elements, k);
+      capstans_.emplace_back(path);
       double size = HUGE_VAL;
       for (const Carrier &c : path.carriers())
         size = std::min(size, c.isBody() ? elements.bodySize(c.body()) : elements.restLength()[c.slot[0]]);
@@ -44,12 +46,14 @@ public:
     return pair.number >= begin_ && pair.number < end_;
   }
 
-  void beginStep(const State &, const Configuration &start, const Step &step, int rod) override {
+  void beginStep(const State &state, const Configuration &start, const Step &step, int rod) override {
     for (const int k : by_rod_.of(rod)) {
       const TendonPath &path = paths_[std::size_t(k)];
       Work &w = work_[std::size_t(k)];
       w = {};
       w.at_start = w.tension = pull(k, start).tension;
+      if (Capstan &capstan = capstans_[std::size_t(k)]; capstan.rubs())
+        capstan.begin(state.tendon_stick.data() + scene_.firstStick(k), start, w.tension);
       if (step.isStatic() || !path.tendon().dissipates()) continue;
       w.damper.rate = 1 / step.dampingDt();
       w.damper.rest = dampedRest(step, path.displacement(start), std::size_t(path.slot()));
@@ -84,7 +88,10 @@ public:
   }
   double energy(const Configuration &c, int rod) const override {
     double sum = 0;
-    for (const int k : by_rod_.of(rod)) sum += pull(k, c).value;
+    for (const int k : by_rod_.of(rod)) {
+      sum += pull(k, c).value;
+      if (capstans_[std::size_t(k)].rubs() && std::isfinite(sum)) sum += capstans_[std::size_t(k)].energy(c);
+    }
     return sum;
   }
   double noise(const Configuration &c, int rod, double) const override {
@@ -92,13 +99,13 @@ public:
     for (const int k : by_rod_.of(rod)) {
       const Pull p = pull(k, c);
       const double blur = paths_[std::size_t(k)].blur(c);
-      sum += (std::abs(p.tension) + p.stiffness * blur) * blur;
+      sum += (std::abs(p.tension) + (p.stiffness + steepest(k, c)) * blur) * blur;
     }
     return sum;
   }
   double forceNoise(const Configuration &c, int rod) const override {
     double sum = 0;
-    for (const int k : by_rod_.of(rod)) sum += pull(k, c).stiffness * paths_[std::size_t(k)].blur(c);
+    for (const int k : by_rod_.of(rod)) sum += (pull(k, c).stiffness + steepest(k, c)) * paths_[std::size_t(k)].blur(c);
     return sum;
   }
   void addEnergies(const State &, const Configuration &c, double, int rod, EnergyBudget &out) const override {
@@ -106,6 +113,18 @@ public:
       const TendonPath &path = paths_[std::size_t(k)];
       out.constraint += storedBy(path.tendon().actuator, path.displacement(c), path.input(c));
     }
+  }
+  double renew(const Configuration &iterate, int rod) override {
+    double most = 0;
+    for (const int k : by_rod_.of(rod))
+      if (capstans_[std::size_t(k)].rubs())
+        most = std::max(most, capstans_[std::size_t(k)].renew(iterate, pull(k, iterate).tension));
+    return most;
+  }
+  void commit(State &state, const Configuration &c, int rod) const override {
+    for (const int k : by_rod_.of(rod))
+      if (capstans_[std::size_t(k)].rubs())
+        capstans_[std::size_t(k)].commit(c, state.tendon_stick.data() + scene_.firstStick(k));
   }
   void addDerivatives(const Configuration &, int, Derivatives &, HessianKind) const override {} // none is of one alone
   void addBetween(const Configuration &c, RodSet island, Derivatives &out, HessianKind kind) const override {
@@ -134,21 +153,25 @@ public:
     for (const int k : by_rod_.of(rod)) {
       const TendonPath &path = paths_[std::size_t(k)];
       const double tension = pull(k, c).tension;
+      const auto [along, factor] = tensionsOf(k, c, tension);
       for (const Tendon::Pull &joint : path.tendon().joints)
         if (elements_.pairOf(joint.joint).parent(0) == slot) {
-          const std::array<Vec3, 2> by = path.byParent(joint, c);
-          for (const std::size_t n : {0u, 1u}) action[n] += tension * by[n];
+          const std::array<Vec3, 2> by = path.byParent(joint, c, along ? &*along : nullptr);
+          for (const std::size_t n : {0u, 1u}) action[n] += factor * by[n];
         }
       if (slot < path.slot() || slot >= path.slot() + path.tendon().slots()) continue;
-      action[0] = slot == path.slot() ? Vec3(-tension, 0, 0)
-                                      : Vec3(tension * path.byTold(c)[std::size_t(slot - path.slot() - 1)]);
+      action[0] = slot == path.slot()
+                      ? Vec3(-tension, 0, 0)
+                      : Vec3(factor * path.byTold(c, along ? &*along : nullptr)[std::size_t(slot - path.slot() - 1)]);
     }
     return action;
   }
 
 private:
+  const Scene &scene_;
   const Elements &elements_;
   std::vector<TendonPath> paths_;
+  std::vector<Capstan> capstans_;
   std::vector<double> sizes_; ///< of the smallest thing that each pulls on [m]
   struct Work {
     TendonDamper damper;
@@ -168,6 +191,14 @@ private:
   }
   /// Where its displacement does not change it, the tension is what the actuator gives.
   double tensionAt(int k, const Pull &p) const { return p.stiffness > 0 ? work_[std::size_t(k)].tension : p.tension; }
+  /// Those of its parts where it rubs, and what derivatives with these are multiplied by.
+  std::pair<std::optional<TensionsAlong>, double> tensionsOf(int k, const Configuration &c, double tension) const {
+    if (!capstans_[std::size_t(k)].rubs()) return {std::nullopt, tension};
+    return {capstans_[std::size_t(k)].tensions(c, tension), 1};
+  }
+  double steepest(int k, const Configuration &c) const {
+    return capstans_[std::size_t(k)].rubs() ? capstans_[std::size_t(k)].stiffness(c) : 0;
+  }
   /// Calls visit(variable, component, slot).
   template <class Visit> static void forVariables(const TendonPath &path, Visit visit) {
     for (std::size_t c = 0; c < path.carriers().size(); ++c)
@@ -199,16 +230,20 @@ private:
     const double tension = tensionAt(k, p);
     if (p.tension == 0 && p.stiffness == 0) return;
     const bool any = kind != HessianKind::none, bent = any && kind != HessianKind::gauss_newton;
+    const auto [along, factor] = tensionsOf(k, c, tension);
     const TendonPath::Derivatives d = path.derivatives(c, bent);
+    const TendonPath::Derivatives rubbing = along ? path.derivatives(c, bent, &*along) : TendonPath::Derivatives(),
+                                  &work = along ? rubbing : d;
     Eigen::MatrixXd hessian;
     if (any) hessian = p.stiffness * d.gradient * d.gradient.transpose();
-    if (bent) hessian += tension * d.hessian;
+    if (bent) hessian += factor * work.hessian;
+    if (any && along) capstans_[std::size_t(k)].addHessian(c, hessian);
     auto block = [&](std::size_t a, std::size_t b) -> Carrier::Hessian {
       if (!any) return Carrier::Hessian::Zero();
       return hessian.block<width, width>(width * Eigen::Index(a), width * Eigen::Index(b));
     };
     for (std::size_t a = 0; a < path.carriers().size(); ++a)
-      addOwn(elements_, path.carriers()[a], tension * d.gradient.segment<width>(width * Eigen::Index(a)), block(a, a),
+      addOwn(elements_, path.carriers()[a], factor * work.gradient.segment<width>(width * Eigen::Index(a)), block(a, a),
              kind, out);
     forVariables(
         path, [&](Eigen::Index v, int a, int slot) { out.gradient[a][slot] += (p.tension - tension) * d.gradient[v]; });

@@ -120,6 +120,8 @@ template <class Archive, class AnyContents> void exchange(Archive &a, AnyContent
   list("rods_that_touch_rods", "rod_contact_stiffness", s.rod_contact_stiffness);
   if (a.format_version < 10) return;
   exchangePairs(a, s, whole);
+  if (a.format_version < 11) return;
+  list("tendon_sticks", "tendon_stick", s.tendon_stick);
 }
 
 /// Whole turns of cells that were others in the checkpoint: twists of vertices stay as they were, by cells or halves.
@@ -343,6 +345,7 @@ void adapt(Found *f, const std::vector<double> &places, const Simulation &run, c
   s.junction_axes.resize(run.elements->groups, {Vec3::UnitX(), Vec3::UnitY()});
   for (Rates &rates : s.memory) rates.body.resize(run.scene.bodies.size());
   s.joints.resize(run.scene.joints.size());
+  s.tendon_stick.resize(std::size_t(run.scene.firstStick(int(run.scene.tendons.size()))), 0.0);
   if (!f->same_method) {
     s.memory.clear();
     s.strains.clear();

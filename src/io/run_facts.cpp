@@ -53,6 +53,10 @@ std::string textOf(const Tendon &t, const Scene &scene) {
   if (a.kind == Actuator::Kind::mckibben)
     text += ", braid " + textOf(a.braid_length) + ", " + textOf(a.turns) + " turns, length " + textOf(a.muscle_length) +
             ", above " + textOf(a.minimum_pressure) + " Pa";
+  if (const std::vector<Tendon::Rub> rubs = t.rubs(); !rubs.empty()) {
+    text += ", slip length " + textOf(t.slip_length) + ", friction";
+    for (const Tendon::Rub &r : rubs) text += " " + textOf(r.friction);
+  }
   for (const Tendon::Pull &p : t.joints)
     text += ", " + textOf(p.coefficient) + " of joint '" + scene.joints[std::size_t(p.joint)].name + "'";
   Digest path;

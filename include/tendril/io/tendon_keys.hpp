@@ -44,6 +44,15 @@ inline constexpr Key tendon_keys[] = {
      "of the cylinder: 0 the nearer one; 1 anticlockwise about the axis from the point before to the point behind, -1 "
      "clockwise, up to three quarters of a turn",
      Bounds{-1, 1}, "", "1"},
+    {"tendons[].path[].friction", KeyType::number, "", "(that of the tendon)",
+     "coefficient of the tendon on this point, cylinder or sphere", not_negative, "", "0.3"},
+    {"tendons[].friction", KeyType::number, "", "0",
+     "coefficient on all points between the first and the last, and on what it winds round: where it slides over a "
+     "turn "
+     "by an angle, the tension changes by the factor exp(friction times angle); the first entry is the actuator's end",
+     not_negative, "", "0.3"},
+    {"tendons[].slip_length", KeyType::number, "m", "(1e-4 of the length as drawn)",
+     "way over which friction comes to its limit", positive, "", "1e-4"},
     {"tendons[].displacement", KeyType::map, "", "(none)",
      "an actuator: a spring with a damper, which draws the tendon's displacement, 0 as drawn, to a target"},
     {"tendons[].displacement.stiffness", KeyType::number, "N/m", "required",
