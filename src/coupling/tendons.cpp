@@ -52,11 +52,19 @@ public:
       Work &w = work_[std::size_t(k)];
       w = {};
       w.at_start = w.tension = pull(k, start).tension;
-      if (Capstan &capstan = capstans_[std::size_t(k)]; capstan.rubs())
-        capstan.begin(state.tendon_stick.data() + scene_.firstStick(k), start, w.tension);
-      if (step.isStatic() || !path.tendon().dissipates()) continue;
-      w.damper.rate = 1 / step.dampingDt();
-      w.damper.rest = dampedRest(step, path.displacement(start), std::size_t(path.slot()));
+      w.taut = w.tension > 0;
+      if (!step.isStatic() && path.tendon().dissipates()) {
+        w.damper.rate = 1 / step.dampingDt();
+        w.damper.rest = dampedRest(step, path.displacement(start), std::size_t(path.slot()));
+      }
+      Capstan &capstan = capstans_[std::size_t(k)];
+      if (!capstan.rubs()) continue;
+      // One that is given comes at once, and might find too little friction to be held.
+      const Actuator &a = path.tendon().actuator;
+      const double expected = a.kind == Actuator::Kind::displacement
+                                  ? w.tension
+                                  : pullOf(a, path.displacement(start), a.inputAt(step.time), w.damper).tension;
+      capstan.begin(state.tendon_stick.data() + scene_.firstStick(k), start, expected);
     }
   }
   /// At the start of a step the plane of axial forces is zero in the slots of tendons.
@@ -64,6 +72,7 @@ public:
     for (const int k : by_rod_.of(rod)) {
       Work &w = work_[std::size_t(k)];
       w.tension = w.at_start + iterate[Configuration::axial_force][paths_[std::size_t(k)].slot()];
+      w.taut = w.tension > 0;
     }
   }
   void setTrialForces(const Configuration &iterate, const Planes &increment, double scale, int rod,
@@ -175,6 +184,7 @@ private:
   std::vector<double> sizes_; ///< of the smallest thing that each pulls on [m]
   struct Work {
     TendonDamper damper;
+    bool taut = false; ///< at the iterate: a spring both ways there, lest all that it holds is free where it is let out
     double at_start = 0, tension = 0; ///< at the start of the step, and at the iterate [N]
   };
   std::vector<Work> work_;
@@ -187,7 +197,8 @@ private:
     const double x = path.displacement(c);
     if (path.tendon().actuator.kind == Actuator::Kind::none) return {};
     if (!std::isfinite(x)) return {HUGE_VAL, 0, 0};
-    return pullOf(path.tendon().actuator, x, path.input(c), work_[std::size_t(k)].damper);
+    const Work &w = work_[std::size_t(k)];
+    return pullOf(path.tendon().actuator, x, path.input(c), w.damper, w.taut);
   }
   /// Where its displacement does not change it, the tension is what the actuator gives.
   double tensionAt(int k, const Pull &p) const { return p.stiffness > 0 ? work_[std::size_t(k)].tension : p.tension; }
@@ -228,7 +239,7 @@ private:
     const TendonPath &path = paths_[std::size_t(k)];
     const Pull p = pull(k, c);
     const double tension = tensionAt(k, p);
-    if (p.tension == 0 && p.stiffness == 0) return;
+    if (p.tension == 0 && p.stiffness == 0 && !capstans_[std::size_t(k)].rubs()) return;
     const bool any = kind != HessianKind::none, bent = any && kind != HessianKind::gauss_newton;
     const auto [along, factor] = tensionsOf(k, c, tension);
     const TendonPath::Derivatives d = path.derivatives(c, bent);

@@ -32,7 +32,7 @@ Pull muscleOf(const Actuator &a, double displacement, double pressure, const Ten
 
 } // namespace
 
-Pull pullOf(const Actuator &a, double x, double input, const TendonDamper &damper) {
+Pull pullOf(const Actuator &a, double x, double input, const TendonDamper &damper, bool taut) {
   switch (a.kind) {
   case Actuator::Kind::none:
     return {};
@@ -46,7 +46,7 @@ Pull pullOf(const Actuator &a, double x, double input, const TendonDamper &dampe
   const double damping = a.damping * damper.rate, stiffness = a.stiffness + damping;
   if (!(stiffness > 0)) return {};
   const double tension = a.stiffness * (x - input) + damping * (x - damper.rest);
-  if (tension <= 0 && !a.compression) return {};
+  if (tension <= 0 && !a.compression && !taut) return {};
   return {0.5 * tension * tension / stiffness, tension, stiffness};
 }
 

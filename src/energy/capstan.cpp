@@ -102,7 +102,9 @@ void Capstan::addHessian(const Configuration &c, Eigen::MatrixXd &hessian) const
 /// equations*), which for one place is a secant.
 double Capstan::renew(const Configuration &c, double tension) {
   constexpr std::size_t most = 5; // rounds that it remembers
+  constexpr double sharper = 100; // than what touches is asked for, as rounds come to it fast
   const std::vector<double> before = frictions(c);
+  const std::vector<Taken> old = taken_;
   const auto count = Eigen::Index(rubs_.size());
   Round now{Eigen::VectorXd(count), Eigen::VectorXd(count)};
   for (Eigen::Index k = 0; k < count; ++k) {
@@ -112,9 +114,10 @@ double Capstan::renew(const Configuration &c, double tension) {
   }
   take(c, now.taken + now.off);
   const std::vector<double> after = frictions(c);
-  double change = 0, size = 0;
+  double change = 0, size = 0, turning = 0;
   for (std::size_t k = 0; k < after.size(); ++k) {
-    change += std::abs(after[k] - before[k]);
+    change += std::abs(after[k] - before[k]) + std::abs(after[k]) * (taken_[k].end[1] - old[k].end[1]).norm();
+    turning += taken_[k].exponent;
     size += std::max(taken_[k].incoming * std::expm1(taken_[k].exponent), std::abs(before[k]));
   }
   if (const auto depth = Eigen::Index(rounds_.size()); depth > 0) {
@@ -128,7 +131,8 @@ double Capstan::renew(const Configuration &c, double tension) {
   }
   if (rounds_.size() == most) rounds_.erase(rounds_.begin());
   rounds_.push_back(std::move(now));
-  return size > 0 ? change / size : 0;
+  // What falls by little from round to round is far from where it goes; what is asked for is a thousandth.
+  return size > 0 ? sharper * change / size * std::exp(turning) : 0;
 }
 
 void Capstan::commit(const Configuration &c, double *stick) const {

@@ -22,7 +22,9 @@ struct TendonDamper {
 /// length L with the pressure p beyond its least one, b the length of a thread of its braid and n its turns, has the
 /// tension p b^2/(4 pi n^2) (3 L^2/b^2 - 1) (Chou and Hannaford 1996, eq. 8).
 /// \param input target [m], tension [N] or pressure [Pa]
-Pull pullOf(const Actuator &actuator, double displacement, double input, const TendonDamper &damper = {});
+/// \param taut that of a displacement is a spring both ways: as it is where Newton's method looks for its tension
+Pull pullOf(const Actuator &actuator, double displacement, double input, const TendonDamper &damper = {},
+            bool taut = false);
 /// What of it a state stores: the energy of a spring [J]. Tensions and pressures that are given do work instead.
 double storedBy(const Actuator &actuator, double displacement, double input);
 /// Work on what is pulled between two displacements at an input that is given, without its damper; 0 of a spring [J].
