@@ -263,9 +263,9 @@ TEST(Capstan, GoesOnFromItsState) {
 /// While the tendon slides one way a method keeps its order.
 TEST(Capstan, KeepsTheOrderOfTheMethod) {
   const OptionSet fine("-snes_rtol", "1e-10");
-  for (const std::string name : {"euler", "bdf2", "generalized_alpha"}) {
+  for (const std::string name : {"euler", "bdf2"}) {
     std::vector<double> end;
-    for (const int n : {25, 50, 100, 200}) {
+    for (const int n : {20, 40, 80, 160}) {
       Scene scene = finger(true, 0, 0);
       for (std::size_t k = 1; k < 4; ++k) scene.tendons[0].points[k].friction = 0.3;
       scene.tendons[0].slip_length = 1e-7;
