@@ -2,8 +2,11 @@
 /// displacement included, as blocks of pairs: no tendon is a column of its own, and slack ones cost what taut ones do.
 /// The tension of a stiff tendon is an unknown of its own, as the axial force of an edge is: what the linearised
 /// displacement asks for. So a step that a stiff tendon begins far from its tension is not lost in what that tension,
-/// many times too large, would do by the curvature of its path. Friction adds to that tension part by part (Capstan).
+/// many times too large, would do by the curvature of its path. A rigid one is a spring whose target goes on by the
+/// tension over its stiffness: so the tension grows until the displacement is at the target itself, as those of exact
+/// joints do (augmented Lagrangian, see coupling/joints.cpp). Friction adds to that tension part by part (Capstan).
 #include "tendril/coupling/couplings.hpp"
+#include "tendril/coupling/held_bodies.hpp"
 #include "tendril/energy/capstan.hpp"
 
 namespace tendril {
@@ -12,7 +15,8 @@ namespace {
 class Tendons final : public Term {
 public:
   Tendons(const Scene &scene, const Elements &elements)
-      : scene_(scene), elements_(elements), work_(scene.tendons.size()), by_rod_(scene.tendons, elements.rods.size()) {
+      : scene_(scene), elements_(elements), held_(whatHolds(scene, elements)), work_(scene.tendons.size()),
+        by_rod_(scene.tendons, elements.rods.size()) {
     paths_.reserve(scene.tendons.size()); // capstans have their places
     for (int k = 0; k < int(scene.tendons.size()); ++k) {
       const TendonPath &path = paths_.emplace_back(scene, elements, k);
@@ -51,7 +55,12 @@ public:
       const TendonPath &path = paths_[std::size_t(k)];
       Work &w = work_[std::size_t(k)];
       w = {};
-      w.at_start = w.tension = pull(k, start).tension;
+      if (path.tendon().actuator.rigid) {
+        w.stiffness = stiffnessAround(k, step);
+        w.at_start = state.tendon_memory[std::size_t(scene_.firstMemory(k + 1)) - 1];
+      } else
+        w.at_start = pull(k, start).tension;
+      w.tension = w.at_start;
       w.taut = w.tension > 0;
       if (!step.isStatic() && path.tendon().dissipates()) {
         w.damper.rate = 1 / step.dampingDt();
@@ -64,7 +73,7 @@ public:
       const double expected = a.kind == Actuator::Kind::displacement
                                   ? w.tension
                                   : pullOf(a, path.displacement(start), a.inputAt(step.time), w.damper).tension;
-      capstan.begin(state.tendon_stick.data() + scene_.firstStick(k), start, expected);
+      capstan.begin(state.tendon_memory.data() + scene_.firstMemory(k), start, expected);
     }
   }
   /// At the start of a step the plane of axial forces is zero in the slots of tendons.
@@ -133,7 +142,10 @@ public:
   void commit(State &state, const Configuration &c, int rod) const override {
     for (const int k : by_rod_.of(rod))
       if (capstans_[std::size_t(k)].rubs())
-        capstans_[std::size_t(k)].commit(c, state.tendon_stick.data() + scene_.firstStick(k));
+        capstans_[std::size_t(k)].commit(c, state.tendon_memory.data() + scene_.firstMemory(k));
+    for (const int k : by_rod_.of(rod))
+      if (paths_[std::size_t(k)].tendon().actuator.rigid)
+        state.tendon_memory[std::size_t(scene_.firstMemory(k + 1)) - 1] = work_[std::size_t(k)].tension;
   }
   void addDerivatives(const Configuration &, int, Derivatives &, HessianKind) const override {} // none is of one alone
   void addBetween(const Configuration &c, RodSet island, Derivatives &out, HessianKind kind) const override {
@@ -179,12 +191,14 @@ public:
 private:
   const Scene &scene_;
   const Elements &elements_;
+  std::vector<Held> held_;
   std::vector<TendonPath> paths_;
   std::vector<Capstan> capstans_;
   std::vector<double> sizes_; ///< of the smallest thing that each pulls on [m]
   struct Work {
     TendonDamper damper;
     bool taut = false; ///< at the iterate: a spring both ways there, lest all that it holds is free where it is let out
+    double stiffness = 0;             ///< of a rigid one, between two updates of its tension [N/m]
     double at_start = 0, tension = 0; ///< at the start of the step, and at the iterate [N]
   };
   std::vector<Work> work_;
@@ -198,7 +212,11 @@ private:
     if (path.tendon().actuator.kind == Actuator::Kind::none) return {};
     if (!std::isfinite(x)) return {HUGE_VAL, 0, 0};
     const Work &w = work_[std::size_t(k)];
-    return pullOf(path.tendon().actuator, x, path.input(c), w.damper, w.taut);
+    const Actuator &a = path.tendon().actuator;
+    if (!a.rigid) return pullOf(a, x, path.input(c), w.damper, w.taut);
+    const double beyond = x - path.input(c), tension = w.tension + w.stiffness * beyond;
+    if (tension <= 0 && !a.compression && !w.taut) return {};
+    return {beyond * (w.tension + 0.5 * w.stiffness * beyond), tension, w.stiffness};
   }
   /// Where its displacement does not change it, the tension is what the actuator gives.
   double tensionAt(int k, const Pull &p) const { return p.stiffness > 0 ? work_[std::size_t(k)].tension : p.tension; }
@@ -206,6 +224,28 @@ private:
   std::pair<std::optional<TensionsAlong>, double> tensionsOf(int k, const Configuration &c, double tension) const {
     if (!capstans_[std::size_t(k)].rubs()) return {std::nullopt, tension};
     return {capstans_[std::size_t(k)].tensions(c, tension), 1};
+  }
+  /// So much stiffer than inertia and what else holds the things that it pulls on [N/m].
+  double stiffnessAround(int k, const Step &step) const {
+    constexpr double stiffer = 1e3;
+    const double rate = step.isStatic() ? 0 : step.rule->mass / (step.dt * step.dt);
+    double most = 0;
+    for (const Carrier &c : paths_[std::size_t(k)].carriers()) {
+      if (!c.isBody()) {
+        const Rod &rod = scene_.rods[std::size_t(c.rod)];
+        const double length = elements_.restLength()[c.slot[0]];
+        most = std::max({most, rate * elements_.mass()[c.slot[0]], rod.material.axial_stiffness / length});
+        continue;
+      }
+      const Held &held = held_[std::size_t(c.body())];
+      const double size = elements_.bodySize(c.body());
+      most = std::max({most, held.stiffness + rate * elements_.bodyMass(c.body()).mass, held.turning / (size * size)});
+      for (const Joint &j : scene_.joints)
+        if (j.driven && (j.child == c.body() || j.parent == c.body()))
+          most = std::max(most, j.drive_stiffness / (j.held().slidesFreely() ? 1 : size * size));
+    }
+    const Rod &host = scene_.rods[std::size_t(paths_[std::size_t(k)].tendon().rod)];
+    return stiffer * (most > 0 ? most : host.material.axial_stiffness / host.length());
   }
   double steepest(int k, const Configuration &c) const {
     return capstans_[std::size_t(k)].rubs() ? capstans_[std::size_t(k)].stiffness(c) : 0;

@@ -23,7 +23,7 @@ Slice::Slice(const Scene &whole, const Partition &partition, const Team &team, b
   }
   for (const Joint &j : whole.joints) parts_[rank_of[j.rod]].joints.push_back(joints_++);
   for (const Tendon &t : whole.tendons)
-    for (std::size_t k = 0; k < t.rubs().size(); ++k) parts_[rank_of[t.rod]].sticks.push_back(sticks_++);
+    for (int k = 0; k < t.remembered(); ++k) parts_[rank_of[t.rod]].sticks.push_back(sticks_++);
   for (const Holder &h : movingHolders(whole)) parts_[rank_of[h.rod]].holders.push_back(holders_++);
   std::vector<std::vector<int>> of_rod(whole.rods.size());
   for (const Holder &h : movingObstacles(whole)) of_rod[h.rod].push_back(holders_++);
@@ -119,7 +119,7 @@ public:
       move(mine.*array, of(array), &Part::bodies, one, std::size_t(slice_.bodies_));
     move(mine.body_rate, of(&State::body_rate), &Part::bodies, one, std::size_t(slice_.bodies_));
     move(mine.joints, of(&State::joints), &Part::joints, one, std::size_t(slice_.joints_));
-    move(mine.tendon_stick, of(&State::tendon_stick), &Part::sticks, one, std::size_t(slice_.sticks_));
+    move(mine.tendon_memory, of(&State::tendon_memory), &Part::sticks, one, std::size_t(slice_.sticks_));
     moveStrains(own, mine, all);
     moveActions(mine, all);
     for (auto array : {&State::contact_stiffness, &State::rod_contact_stiffness})

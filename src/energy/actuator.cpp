@@ -43,6 +43,7 @@ Pull pullOf(const Actuator &a, double x, double input, const TendonDamper &dampe
   case Actuator::Kind::displacement:
     break;
   }
+  if (a.rigid) return {};
   const double damping = a.damping * damper.rate, stiffness = a.stiffness + damping;
   if (!(stiffness > 0)) return {};
   const double tension = a.stiffness * (x - input) + damping * (x - damper.rest);
@@ -51,7 +52,7 @@ Pull pullOf(const Actuator &a, double x, double input, const TendonDamper &dampe
 }
 
 double storedBy(const Actuator &a, double x, double input) {
-  return a.kind == Actuator::Kind::displacement ? pullOf(a, x, input).value : 0;
+  return a.kind == Actuator::Kind::displacement && !a.rigid ? pullOf(a, x, input).value : 0;
 }
 
 double workBetween(const Actuator &a, double from, double to, double input) {

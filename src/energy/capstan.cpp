@@ -165,17 +165,17 @@ TendonReading readTendon(const Scene &scene, const Elements &elements, int index
   out.length = path.length(c);
   out.displacement = path.displacement(c);
   if (dynamic) out.rate = path.rate(state, c);
+  const std::vector<Tendon::Rub> rubs = path.tendon().rubs();
+  const std::vector<double> none(rubs.size() + 1, 0.0);
+  const double *memory =
+      state.tendon_memory.empty() ? none.data() : state.tendon_memory.data() + scene.firstMemory(index);
   // The damper pulls by the rate: as one whose way over a second this is.
-  out.tension =
-      pullOf(actuator, out.displacement, path.input(c), {dynamic ? 1.0 : 0.0, out.displacement - out.rate}).tension;
+  out.tension = actuator.rigid ? memory[rubs.size()]
+                               : pullOf(actuator, out.displacement, path.input(c),
+                                        {dynamic ? 1.0 : 0.0, out.displacement - out.rate})
+                                     .tension;
   const Tendon &tendon = path.tendon();
-  const std::vector<Tendon::Rub> rubs = tendon.rubs();
-  if (!rubs.empty()) {
-    const std::vector<double> none(rubs.size(), 0.0);
-    const double *stick =
-        state.tendon_stick.empty() ? none.data() : state.tendon_stick.data() + scene.firstStick(index);
-    out.along = tensionsAlong(path, stick, c, out.tension);
-  }
+  if (!rubs.empty()) out.along = tensionsAlong(path, memory, c, out.tension);
   out.points = path.drawn(c);
   out.point_tension.assign(out.points.size(), out.tension);
   if (rubs.empty()) return out;

@@ -114,7 +114,7 @@ template <class Archive, class AnyContents> void exchange(Archive &a, AnyContent
   list(8, "joints", "joints", s.joints);
   list(9, "rods_that_touch_rods", "rod_contact_stiffness", s.rod_contact_stiffness);
   if (a.format_version >= 10) exchangePairs(a, s, whole);
-  list(11, "tendon_sticks", "tendon_stick", s.tendon_stick);
+  list(11, "tendon_numbers", "tendon_memory", s.tendon_memory);
 }
 
 /// Whole turns of cells that were others in the checkpoint: twists of vertices stay as they were, by cells or halves.
@@ -154,7 +154,7 @@ void beginAnew(const Simulation &run, State *state, std::vector<std::string> *to
   state->support_actions.clear();
   state->contacts.clear();
   state->pairs.clear();
-  std::fill(state->tendon_stick.begin(), state->tendon_stick.end(), 0.0);
+  std::fill(state->tendon_memory.begin(), state->tendon_memory.end(), 0.0);
   state->last_dt = state->dt_before = 0;
   const Configuration c = configurationOf(*state, run.scene, *run.elements, state->time);
   for (std::size_t r = 0; r < run.elements->rods.size(); ++r) {
@@ -332,7 +332,7 @@ void adapt(Found *f, const std::vector<double> &places, const Simulation &run, c
   const bool other_cells = !cells.empty() && cells != places;
   if (cells.empty() && s.winding.size() != places.size()) s.winding.assign(places.size(), 0.0);
   const std::size_t rods = run.elements->rods.size(),
-                    sticks = std::size_t(run.scene.firstStick(int(run.scene.tendons.size())));
+                    sticks = std::size_t(run.scene.firstMemory(int(run.scene.tendons.size())));
   for (auto stiffness : {&State::contact_stiffness, &State::rod_contact_stiffness})
     if ((s.*stiffness).size() < rods) (s.*stiffness).clear();
   if (s.contacts.size() != rods) s.contacts.clear();
@@ -340,7 +340,7 @@ void adapt(Found *f, const std::vector<double> &places, const Simulation &run, c
   s.junction_axes.resize(run.elements->groups, {Vec3::UnitX(), Vec3::UnitY()});
   for (Rates &rates : s.memory) rates.body.resize(run.scene.bodies.size());
   s.joints.resize(run.scene.joints.size());
-  s.tendon_stick.resize(sticks);
+  s.tendon_memory.resize(std::max(s.tendon_memory.size(), sticks));
   if (!f->same_method) {
     s.memory.clear();
     s.strains.clear();

@@ -49,7 +49,7 @@ std::string textOf(const Motion &m) {
 std::string textOf(const Tendon &t, const Scene &scene) {
   const Actuator &a = t.actuator;
   std::string text = std::string(nameOf(a.kind)) + ", stiffness " + textOf(a.stiffness) + ", damping " +
-                     textOf(a.damping) + (a.compression ? ", pushes" : "");
+                     textOf(a.damping) + (a.compression ? ", pushes" : "") + (a.rigid ? ", rigid" : "");
   if (a.kind == Actuator::Kind::mckibben)
     text += ", braid " + textOf(a.braid_length) + ", " + textOf(a.turns) + " turns, length " + textOf(a.muscle_length) +
             ", above " + textOf(a.minimum_pressure) + " Pa";

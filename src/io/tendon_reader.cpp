@@ -270,11 +270,18 @@ void readActuator(YamlMap &map, double length, Tendon &tendon) {
   if (map.has("tendons[].displacement")) {
     YamlMap block(map.at("tendons[].displacement"), "tendons[].displacement");
     out.kind = Actuator::Kind::displacement;
-    out.stiffness = block.number("tendons[].displacement.stiffness");
+    out.rigid = block.flag("tendons[].displacement.rigid");
+    for (const AnyKey key : {AnyKey("tendons[].displacement.stiffness"), AnyKey("tendons[].displacement.damping")})
+      if (out.rigid && block.has(key))
+        block.at(key).fail("'" + std::string(key->name()) +
+                           "' is of a spring, and the tendon is 'rigid'; take it away");
+    if (!out.rigid && !block.has("tendons[].displacement.stiffness"))
+      block.value().fail("needs the key 'stiffness', or 'rigid: true'");
+    if (!out.rigid) out.stiffness = block.number("tendons[].displacement.stiffness");
     out.damping = block.number("tendons[].displacement.damping");
     out.compression = block.flag("tendons[].displacement.compression");
     readInput(block, "tendons[].displacement.target", "tendons[].displacement.table", false, out);
-    if (out.stiffness == 0 && out.damping == 0)
+    if (!out.rigid && out.stiffness == 0 && out.damping == 0)
       block.value().fail("'stiffness' and 'damping' are both zero: nothing is pulled");
     block.finish();
   }

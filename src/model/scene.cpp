@@ -294,11 +294,14 @@ std::vector<int> Scene::rodsOf(const Tendon &tendon) const {
   return all;
 }
 
-bool Scene::tendonsRub() const { return whole ? whole->tendons_rub : firstStick(int(tendons.size())) > 0; }
+bool Scene::tendonsRub() const {
+  return whole ? whole->tendons_rub
+               : std::any_of(tendons.begin(), tendons.end(), [](const Tendon &t) { return !t.rubs().empty(); });
+}
 
-int Scene::firstStick(int tendon) const {
+int Scene::firstMemory(int tendon) const {
   int count = 0;
-  for (int k = 0; k < tendon; ++k) count += int(tendons[std::size_t(k)].rubs().size());
+  for (int k = 0; k < tendon; ++k) count += tendons[std::size_t(k)].remembered();
   return count;
 }
 

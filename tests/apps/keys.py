@@ -116,6 +116,8 @@ def exampleScene(path, value):
             tendon["path"] = [from_world, entry, {"body": "world", "point": [0.5, 0, -2]}]
             tendon.setdefault("friction", 0.2)
             put(scene, "tendons[].force.tension", 10)
+        if path.startswith("tendons[].displacement.") and name != "rigid":
+            put(scene, "tendons[].displacement.stiffness", tendon["displacement"].get("stiffness", 1e4))
         if "table" not in tendon.get("force", {"table": 0}):
             put(scene, "tendons[].force.tension", 10)
         if "table" not in tendon.get("mckibben", {"table": 0}):

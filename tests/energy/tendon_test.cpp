@@ -177,7 +177,7 @@ struct InAStep {
   explicit InAStep(const Scene &scene, double stick = 0) { start(scene, stick); }
   void start(const Scene &scene, double stick) {
     EXPECT_PETSC(sim.setUp(scene, dynamics(0.01, 1)));
-    std::fill(sim.state.tendon_stick.begin(), sim.state.tendon_stick.end(), stick);
+    std::fill(sim.state.tendon_memory.begin(), sim.state.tendon_memory.end(), stick);
     const Step step = TimeLoop::stepOf(dynamics(0.01, 1), sim.state, 0.01);
     EXPECT_PETSC(sim.solver.begin(sim.state, step));
     term = makeTendons(sim.scene, *sim.elements);

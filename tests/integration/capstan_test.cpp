@@ -319,5 +319,68 @@ TEST(Capstan, DrivesADrumAsABeltDoes) {
   EXPECT_LT(t.tension, 0.9 * weight * std::exp(0.5 * pi));
 }
 
+/// A rigid tendon is the limit of stiff ones: what these leave falls as 1/k, and one extrapolates to it.
+TEST(RigidTendon, IsTheLimitOfStiffOnes) {
+  std::array<double, 3> first{}, second{}, limit{};
+  auto rests = [](double stiffness, int *iterations, int *steps) {
+    Scene scene = finger(true, 9.81, 0.1);
+    Actuator &a = scene.tendons[0].actuator;
+    a.rigid = stiffness == 0;
+    a.stiffness = stiffness;
+    Simulation run;
+    runAndWatch(run, scene, statics(4), [&](const Diagnostics &row) {
+      *iterations += row.newton_iterations;
+      ++*steps;
+    });
+    const TendonReading t = readingOf(run);
+    if (stiffness == 0) EXPECT_NEAR(t.displacement, 0, 1e-12);
+    return std::array<double, 3>{angleOf(run, 0), angleOf(run, 2), t.tension};
+  };
+  int iterations = 0, steps = 0, other = 0;
+  first = rests(1e5, &other, &other);
+  second = rests(2e5, &other, &other);
+  limit = rests(0, &iterations, &steps);
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_NEAR(limit[k], 2 * second[k] - first[k], 1e-6 * std::abs(limit[k])) << k; // of the second order
+    EXPECT_GT(std::abs(limit[k] - second[k]), 1e-6) << k;
+  }
+  EXPECT_LE(iterations, 10 * steps);
+}
+
+/// Slack and taut again in time, with its tension nowhere negative, and never longer than its target; from a state in
+/// the middle on to the same bits.
+TEST(RigidTendon, GoesSlackAndTaut) {
+  Scene scene = finger(true, 0, 0.05);
+  scene.tendons[0].actuator.rigid = true;
+  for (std::size_t k = 1; k < 4; ++k) scene.tendons[0].points[k].friction = 0.1;
+  scene.tendons[0].slip_length = 1e-5;
+  scene.tendons[0].points[0].motion.table = {
+      {0, Vec3::Zero(), Vec3::Zero()}, {0.4, Vec3(-0.05, 0, 0), Vec3::Zero()}, {0.45, Vec3::Zero(), Vec3::Zero()}};
+  for (Joint &j : scene.joints) j.drive_damping = 0.01;
+  const LoopSettings settings = dynamics(1.0 / 64, 2);
+  Simulation whole, part;
+  State middle;
+  int changes = 0;
+  bool taut = false;
+  runAndWatch(whole, scene, settings, [&](const Diagnostics &row) {
+    const TendonReading t = readingOf(whole, true);
+    EXPECT_GE(t.tension, 0);
+    EXPECT_LT(t.displacement, 1e-9);
+    if (t.tension > 0) EXPECT_NEAR(t.displacement, 0, 1e-9);
+    if (row.time == 0.25) middle = whole.state;
+    changes += (t.tension > 0) != taut;
+    taut = t.tension > 0;
+  });
+  EXPECT_GE(changes, 2);
+  EXPECT_GT(middle.tendon_memory.back(), 1);
+  EXPECT_PETSC(part.setUp(scene, settings));
+  part.state = middle;
+  TimeLoop loop(part.solver, settings);
+  bool finished = false;
+  EXPECT_PETSC(loop.run(
+      part.state, [](const State &, const Diagnostics &) { return PetscErrorCode(0); }, &finished));
+  EXPECT_TRUE(finished && part.state == whole.state);
+}
+
 } // namespace
 } // namespace tendril::test

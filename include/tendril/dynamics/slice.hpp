@@ -31,7 +31,7 @@ private:
     std::vector<int> rods, groups; ///< groups of junctions, then bodies
     std::vector<int> bodies;
     std::vector<int> joints;  ///< between bodies
-    std::vector<int> sticks;  ///< of tendons that rub
+    std::vector<int> sticks;  ///< that tendons remember
     std::vector<int> holders; ///< that move: those of movingHolders, and behind them movingObstacles
   };
   Team team_;

@@ -152,10 +152,10 @@ struct Scene {
   /// Bodies that a tendon pulls on, and rods, with those that bodies have; each once.
   std::vector<int> bodiesOf(const Tendon &tendon) const;
   std::vector<int> rodsOf(const Tendon &tendon) const;
-  /// Whether tendons rub on what they run over; and of what State::tendon_stick has of them: the first of a tendon, of
+  /// Whether tendons rub on what they run over; and of what State::tendon_memory has of all: the first of a tendon, of
   /// their number how many.
   bool tendonsRub() const;
-  int firstStick(int tendon) const;
+  int firstMemory(int tendon) const;
   /// Whether a tendon runs through points beside the axis of a rod, which its twist moves.
   bool tendonsTwist() const;
   /// Whether junctions, ties, bodies or tendons join rods.

@@ -25,6 +25,7 @@ struct Actuator {
   Motion input_motion;               ///< ... of which it is the displacement along x
   double stiffness = 0, damping = 0; ///< [N/m], [N s/m]
   bool compression = false;          ///< whether it may push, too
+  bool rigid = false;                ///< of a displacement: not beyond the target, in place of a spring
   /// Of a muscle: its length as drawn, that of a thread of its braid, the turns of this about it, and the pressure
   /// below which it does nothing [m], [m], -, [Pa].
   double muscle_length = 0, braid_length = 0, turns = 0, minimum_pressure = 0;
@@ -116,6 +117,9 @@ struct Tendon {
     for (const Segment &s : segments) count += s.wrap < 0 ? 0 : drawn_points;
     return count;
   }
+  /// How many numbers a state remembers: by how much it is drawn at each place where it rubs, up to where it slides
+  /// [m]; and of a rigid one the tension [N].
+  int remembered() const { return int(rubs().size()) + actuator.rigid; }
   bool dissipates() const { return actuator.damping > 0; }
   /// First of the parts of a segment; of the number of segments: how many parts there are.
   int firstPart(int segment) const {

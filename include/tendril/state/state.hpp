@@ -85,9 +85,8 @@ struct State {
   std::vector<double>
       winding; ///< (cells) 2 pi x whole turns of the twist angle, carried by continuity (`angle` measure) [rad]
   std::vector<JointState> joints; ///< (nj)
-  /// By how much tendons are drawn where they rub, up to where they slide: all of a tendon, in the order of its path,
-  /// then those of the next [m].
-  std::vector<double> tendon_stick;
+  /// All of a tendon (Tendon::remembered), then of the next.
+  std::vector<double> tendon_memory;
   double last_dt = 0;        ///< length of the step that led here; 0 where the integrator remembers nothing [s]
   double dt_before = 0;      ///< of the step before that; 0 where there was none [s]
   std::vector<Rates> memory; ///< what the integrator remembers of steps before
