@@ -488,6 +488,12 @@ class Tendon:
         """[N]."""
         return self.field("tendon_tension", frame)
 
+    def point_tension(self, frame=-1):
+        """Behind each of its points, (points); of the last before it [N]."""
+        if not self.points:
+            return np.zeros((*np.shape(self._t.time[frame]), 0))
+        return self.field("tendon_point_tension", frame)
+
     def position(self, frame=-1):
         """Of its points, (points, 3) [m]."""
         if not self.points:  # a file may have none at all

@@ -23,6 +23,9 @@ void requireDeadLoads(const Scene &scene) {
       throw SceneError("joint '" + j.name +
                        "' is moved, by its parent or its drive: -continuation arclength scales dead loads only; hold "
                        "it still or use -continuation load");
+  if (scene.tendonsRub())
+    throw SceneError("tendons have friction, whose forces depend on the way: -continuation arclength goes back and "
+                     "forth; take their 'friction' away or use -continuation load");
   for (const Tendon &t : scene.tendons)
     if (t.isMoved())
       throw SceneError("tendon '" + t.name +

@@ -98,6 +98,7 @@ State prolonged(const State &state, const Scene &scene, const Elements &elements
     out.body_rate.push_back({});
   }
   out.joints = state.joints;
+  out.tendon_memory = state.tendon_memory;
   out.position_low.assign(out.position.size(), Vec3::Zero());
   out.velocity.assign(out.position.size(), Vec3::Zero());
   out.twist_rate.assign(out.director.size(), 0.0);

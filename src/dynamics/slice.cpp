@@ -22,6 +22,8 @@ Slice::Slice(const Scene &whole, const Partition &partition, const Team &team, b
     parts_[rank_of[b.rod]].groups.push_back(groups_++);
   }
   for (const Joint &j : whole.joints) parts_[rank_of[j.rod]].joints.push_back(joints_++);
+  for (const Tendon &t : whole.tendons)
+    for (int k = 0; k < t.remembered(); ++k) parts_[rank_of[t.rod]].sticks.push_back(sticks_++);
   for (const Holder &h : movingHolders(whole)) parts_[rank_of[h.rod]].holders.push_back(holders_++);
   std::vector<std::vector<int>> of_rod(whole.rods.size());
   for (const Holder &h : movingObstacles(whole)) of_rod[h.rod].push_back(holders_++);
@@ -31,9 +33,9 @@ Slice::Slice(const Scene &whole, const Partition &partition, const Team &team, b
 
 Scene Slice::sceneOf(const Scene &whole) const {
   Scene own = withRods(whole, parts_[team_.rank()].rods);
-  own.whole = {
-      whole.strainsDissipate(),  whole.slides(), whole.hasCouples(), whole.touchesRods(), whole.touchesBodies(),
-      whole.slidesAmongMoving(), whole.edges()};
+  own.whole = {whole.strainsDissipate(), whole.slides(),        whole.hasCouples(),
+               whole.touchesRods(),      whole.touchesBodies(), whole.slidesAmongMoving(),
+               whole.tendonsRub(),       whole.edges()};
   return own;
 }
 
@@ -117,6 +119,7 @@ public:
       move(mine.*array, of(array), &Part::bodies, one, std::size_t(slice_.bodies_));
     move(mine.body_rate, of(&State::body_rate), &Part::bodies, one, std::size_t(slice_.bodies_));
     move(mine.joints, of(&State::joints), &Part::joints, one, std::size_t(slice_.joints_));
+    move(mine.tendon_memory, of(&State::tendon_memory), &Part::sticks, one, std::size_t(slice_.sticks_));
     moveStrains(own, mine, all);
     moveActions(mine, all);
     for (auto array : {&State::contact_stiffness, &State::rod_contact_stiffness})

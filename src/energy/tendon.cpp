@@ -11,66 +11,7 @@ namespace {
 
 constexpr int width = Carrier::variables;
 
-/// Of a muscle its potential p (L^3/b^2 - L) b^2/(4 pi n^2), and the factor alone.
-double muscleFactor(const Actuator &a, double pressure) {
-  const double beyond = std::max(0.0, pressure - a.minimum_pressure);
-  return beyond * a.braid_length * a.braid_length / (4 * pi * a.turns * a.turns);
-}
-double muscleShape(const Actuator &a, double length) {
-  return length * (length * length / (a.braid_length * a.braid_length) - 1);
-}
-
-Pull muscleOf(const Actuator &a, double displacement, double pressure, const TendonDamper &damper) {
-  const double factor = muscleFactor(a, pressure), damping = a.damping * damper.rate,
-               square = a.braid_length * a.braid_length, rest = a.muscle_length + damper.rest,
-               length = a.muscle_length + displacement;
-  auto tension = [&](double l) { return factor * (3 * l * l / square - 1) + damping * (l - rest); };
-  auto potential = [&](double l) { return factor * muscleShape(a, l) + 0.5 * damping * (l - rest) * (l - rest); };
-  if (!(length > 0 && tension(length) > 0)) return {};
-  // The longest length without tension: of a quadratic equation the root that is positive.
-  const double lead = 3 * factor / square,
-               slack = lead > 0 ? (std::sqrt(std::max(0.0, damping * damping + 4 * lead * (factor + damping * rest))) -
-                                   damping) /
-                                      (2 * lead)
-                                : rest;
-  return {potential(length) - potential(slack), tension(length), 2 * lead * length + damping};
-}
-
 } // namespace
-
-Pull pullOf(const Actuator &a, double x, double input, const TendonDamper &damper) {
-  switch (a.kind) {
-  case Actuator::Kind::none:
-    return {};
-  case Actuator::Kind::force:
-    return {input * x, input, 0};
-  case Actuator::Kind::mckibben:
-    return muscleOf(a, x, input, damper);
-  case Actuator::Kind::displacement:
-    break;
-  }
-  const double damping = a.damping * damper.rate, stiffness = a.stiffness + damping;
-  if (!(stiffness > 0)) return {};
-  const double tension = a.stiffness * (x - input) + damping * (x - damper.rest);
-  if (tension <= 0 && !a.compression) return {};
-  return {0.5 * tension * tension / stiffness, tension, stiffness};
-}
-
-double storedBy(const Actuator &a, double x, double input) {
-  return a.kind == Actuator::Kind::displacement ? pullOf(a, x, input).value : 0;
-}
-
-double workBetween(const Actuator &a, double from, double to, double input) {
-  if (a.kind == Actuator::Kind::none || a.kind == Actuator::Kind::displacement) return 0;
-  return pullOf(a, from, input).value - pullOf(a, to, input).value;
-}
-
-double stiffnessAsDrawn(const Tendon &tendon) {
-  const Actuator &a = tendon.actuator;
-  if (a.kind == Actuator::Kind::displacement) return a.stiffness;
-  if (a.kind != Actuator::Kind::mckibben) return 0;
-  return 6 * muscleFactor(a, a.largestInput()) * a.muscle_length / (a.braid_length * a.braid_length);
-}
 
 Vec3 asDrawn(const Scene &scene, const Waypoint &p) {
   if (p.rod < 0) return p.point;
@@ -174,6 +115,40 @@ double TendonPath::length(const Configuration &c) const {
   return sum;
 }
 
+std::vector<double> TendonPath::lengths(const Configuration &c) const {
+  std::vector<double> all;
+  for (const Tendon::Segment &s : tendon().segments) all.push_back(wayOf(s, c).value);
+  return all;
+}
+
+double TendonPath::turningAt(const Tendon::Rub &rub, const Configuration &c) const {
+  const Tendon::Segment *const s = &tendon().segments[std::size_t(rub.segment)];
+  const WayLength way = wayOf(s[0], c);
+  if (rub.winds) return way.turning;
+  const Vec3 in = way.gradient.tail<3>(), out = -wayOf(s[1], c).gradient.head<3>();
+  return std::atan2(in.cross(out).norm(), in.dot(out));
+}
+
+std::array<Vec3, 2> TendonPath::endOf(int segment, const Configuration &c) const {
+  const Tendon::Segment &s = tendon().segments[std::size_t(segment)];
+  const Seen round = seen(s, c);
+  return {round.end[1], round.axes.transpose() * wayOf(s, c).gradient.tail<3>()};
+}
+
+WayLength TendonPath::workOf(int segment, const Configuration &c, const TensionsAlong *along) const {
+  const Tendon::Segment &s = tendon().segments[std::size_t(segment)];
+  WayLength way = wayOf(s, c);
+  if (!along) return way;
+  const auto part = std::size_t(tendon().firstPart(segment));
+  const Vec3 arriving = s.wrap < 0 || along->arriving.empty()
+                            ? Vec3(way.gradient.tail<3>())
+                            : Vec3(seen(s, c).axes * along->arriving[std::size_t(segment)]);
+  way.gradient *= along->part[part];
+  way.hessian *= along->part[part];
+  if (s.wrap >= 0) way.gradient.tail<3>() += (along->part[part + 1] - along->part[part]) * arriving;
+  return way;
+}
+
 /// The coordinate of its joint.
 static JointRow rowOf(const Scene &scene, const Elements &elements, const Tendon::Pull &pull, const Configuration &c) {
   const Joint &joint = scene.joints[std::size_t(pull.joint)];
@@ -186,19 +161,26 @@ double TendonPath::coordinates(const Configuration &c) const {
   return sum;
 }
 
-TendonPath::Derivatives TendonPath::derivatives(const Configuration &c, bool second) const {
+double TendonPath::factorOf(const Tendon::Pull &pull, const TensionsAlong *along) const {
+  const auto last = std::size_t(std::max(0, tendon().firstPart(pull.after) - 1));
+  return pull.coefficient * (along ? along->part[last] : 1);
+}
+
+TendonPath::Derivatives TendonPath::derivatives(const Configuration &c, bool second, const TensionsAlong *along) const {
   const auto size = Eigen::Index(width * carriers_.size());
   Derivatives out{Eigen::VectorXd::Zero(size), {}};
   if (second) out.hessian = Eigen::MatrixXd::Zero(size, size);
-  for (const Tendon::Segment &s : tendon().segments) addSegment(s, c, second, out);
-  for (const Tendon::Pull &pull : tendon().joints) addJoint(pull, c, second, out);
+  for (int n = 0; n < int(tendon().segments.size()); ++n) addSegment(n, c, second, along, out);
+  for (const Tendon::Pull &pull : tendon().joints) addJoint(pull, c, second, factorOf(pull, along), out);
   return out;
 }
 
 /// With w the place of an end x as the body sees that it winds round, exp(-d) (x - p), its derivatives are those of
 /// x - p and w x d; of second order g.w has what x has, that of the arm w, and -d x (dx - dp).
-void TendonPath::addSegment(const Tendon::Segment &s, const Configuration &c, bool second, Derivatives &out) const {
-  const WayLength way = wayOf(s, c);
+void TendonPath::addSegment(int segment, const Configuration &c, bool second, const TensionsAlong *along,
+                            Derivatives &out) const {
+  const Tendon::Segment &s = tendon().segments[std::size_t(segment)];
+  const WayLength way = workOf(segment, c, along);
   const Carried *const centre = s.wrap < 0 ? nullptr : &rounds_[std::size_t(s.wrap)].centre;
   const int body = centre ? centre->carrier : -1;
   /// Derivatives of an end by the variables of its carrier, and by those of the body.
@@ -253,7 +235,8 @@ void TendonPath::addSegment(const Tendon::Segment &s, const Configuration &c, bo
     }
 }
 
-void TendonPath::addJoint(const Tendon::Pull &pull, const Configuration &c, bool second, Derivatives &out) const {
+void TendonPath::addJoint(const Tendon::Pull &pull, const Configuration &c, bool second, double times,
+                          Derivatives &out) const {
   const Joint &joint = scene_->joints[std::size_t(pull.joint)];
   const JointRow row = rowOf(*scene_, *elements_, pull, c);
   std::array<int, 2> first{-1, -1};
@@ -264,11 +247,11 @@ void TendonPath::addJoint(const Tendon::Pull &pull, const Configuration &c, bool
                       carriers_.begin());
   for (std::size_t j = 0; j < 2; ++j) {
     if (first[j] < 0) continue;
-    out.gradient.segment<6>(first[j]) += pull.coefficient * row.gradient.segment<6>(6 * Eigen::Index(j));
+    out.gradient.segment<6>(first[j]) += times * row.gradient.segment<6>(6 * Eigen::Index(j));
     for (std::size_t k = 0; k < 2 && second; ++k)
       if (first[k] >= 0)
         out.hessian.block<6, 6>(first[j], first[k]) +=
-            pull.coefficient * row.hessian.block<6, 6>(6 * Eigen::Index(j), 6 * Eigen::Index(k));
+            times * row.hessian.block<6, 6>(6 * Eigen::Index(j), 6 * Eigen::Index(k));
   }
 }
 
@@ -302,10 +285,11 @@ std::vector<Vec3> TendonPath::drawn(const Configuration &c) const {
   return all;
 }
 
-std::vector<Vec3> TendonPath::byTold(const Configuration &c) const {
+std::vector<Vec3> TendonPath::byTold(const Configuration &c, const TensionsAlong *along) const {
   std::vector<Vec3> by(points_.size(), Vec3::Zero()), told;
-  for (const Tendon::Segment &s : tendon().segments) {
-    const WayLength way = wayOf(s, c);
+  for (int n = 0; n < int(tendon().segments.size()); ++n) {
+    const Tendon::Segment &s = tendon().segments[std::size_t(n)];
+    const WayLength way = workOf(n, c, along);
     by[std::size_t(s.from)] += way.gradient.head<3>();
     by[std::size_t(s.to)] += way.gradient.tail<3>();
   }
@@ -314,10 +298,12 @@ std::vector<Vec3> TendonPath::byTold(const Configuration &c) const {
   return told;
 }
 
-std::array<Vec3, 2> TendonPath::byParent(const Tendon::Pull &pull, const Configuration &c) const {
+std::array<Vec3, 2> TendonPath::byParent(const Tendon::Pull &pull, const Configuration &c,
+                                         const TensionsAlong *along) const {
   if (scene_->joints[std::size_t(pull.joint)].parent >= 0) return {Vec3::Zero(), Vec3::Zero()};
   const JointRow row = rowOf(*scene_, *elements_, pull, c);
-  return {Vec3(pull.coefficient * row.gradient.segment<3>(6)), Vec3(pull.coefficient * row.gradient.segment<3>(9))};
+  const double times = factorOf(pull, along);
+  return {Vec3(times * row.gradient.segment<3>(6)), Vec3(times * row.gradient.segment<3>(9))};
 }
 
 double TendonPath::rate(const State &state, const Configuration &c) const {
@@ -367,21 +353,6 @@ double TendonPath::blur(const Configuration &c) const {
     size += std::numeric_limits<double>::epsilon() * place.low.norm() + 1e-32 * place.high.norm();
   }
   return 4 * (size + std::numeric_limits<double>::epsilon() * (std::abs(drawn_) + std::abs(coordinates(c))));
-}
-
-TendonReading readTendon(const Scene &scene, const Elements &elements, int index, const State &state,
-                         const Configuration &c, bool dynamic) {
-  const TendonPath path(scene, elements, index);
-  const Actuator &actuator = path.tendon().actuator;
-  TendonReading out;
-  out.length = path.length(c);
-  out.displacement = path.displacement(c);
-  if (dynamic) out.rate = path.rate(state, c);
-  out.points = path.drawn(c);
-  // The damper pulls by the rate: as one whose way over a second this is.
-  out.tension =
-      pullOf(actuator, out.displacement, path.input(c), {dynamic ? 1.0 : 0.0, out.displacement - out.rate}).tension;
-  return out;
 }
 
 } // namespace tendril

@@ -28,8 +28,9 @@ HolderActions staticActions(const Scene &scene, const Elements &elements, const 
   for (const Holder &h : moving)
     if (h.tendon) {
       const TendonPath path(scene, elements, h.index);
-      const double tension = readTendon(scene, elements, h.index, state, c, false).tension;
-      const Vec3 force = h.place == 0 ? Vec3(-tension, 0, 0) : Vec3(tension * path.byTold(c)[std::size_t(h.place - 1)]);
+      const TendonReading of = readTendon(scene, elements, h.index, state, c, false);
+      const Vec3 force = h.place == 0 ? Vec3(-of.tension, 0, 0)
+                                      : Vec3(of.factor() * path.byTold(c, of.tensions())[std::size_t(h.place - 1)]);
       out.insert(out.end(), {force, Vec3::Zero()});
     } else if (h.joint) {
       const JointReading &of = actions.joint[h.index];
@@ -41,9 +42,9 @@ HolderActions staticActions(const Scene &scene, const Elements &elements, const 
           const TendonPath path(scene, elements, k);
           for (const Tendon::Pull &pull : path.tendon().joints) {
             if (pull.joint != h.index) continue;
-            const double tension = readTendon(scene, elements, k, state, c, false).tension;
-            const std::array<Vec3, 2> by = path.byParent(pull, c);
-            for (const std::size_t n : {0u, 1u}) action[n] += tension * by[n];
+            const TendonReading with = readTendon(scene, elements, k, state, c, false);
+            const std::array<Vec3, 2> by = path.byParent(pull, c, with.tensions());
+            for (const std::size_t n : {0u, 1u}) action[n] += with.factor() * by[n];
           }
         }
         out.insert(out.end(), {action[0], action[1]});

@@ -70,6 +70,7 @@ WayLength wayRoundCylinder(const Vec3 &from, const Vec3 &to, double radius, int 
   }
   out.angle = w.angle;
   out.value = std::hypot(h, dz);
+  out.turning = w.angle * h / out.value;
   Eigen::Matrix<double, 6, 1> by_h = Eigen::Matrix<double, 6, 1>::Zero(), by_z = by_h;
   Eigen::Matrix<double, 6, 6> bent = Eigen::Matrix<double, 6, 6>::Zero();
   auto add = [&](int first, const Vec2 &end, double free, double angle) {
@@ -99,7 +100,7 @@ WayLength wayRoundSphere(const Vec3 &from, const Vec3 &to, double radius) {
   if (angle <= 0) return straightWay(to - from);
   const double free_from = std::sqrt(a * a - radius * radius), free_to = std::sqrt(b * b - radius * radius);
   if (!(free_from > 0 && free_to > 0 && sine > 1e-6)) return out; // straight through the middle all planes are alike
-  out.angle = angle;
+  out.angle = out.turning = angle;
   out.value = free_from + free_to + radius * angle;
   const Vec3 m = normal / sine;
   auto add = [&](int first, const Vec3 &end, const Vec3 &other, double distance, double free) {

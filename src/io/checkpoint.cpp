@@ -94,19 +94,16 @@ template <class Archive, class AnyContents> void exchange(Archive &a, AnyContent
     a.array("memory_edge_" + std::to_string(n), s.memory[n].edge, elements.edges());
   }
   a.array("strains", s.strains, strains);
-  auto list = [&](const char *count, const char *name, auto &array) {
+  auto list = [&](std::size_t since, const char *count, const char *name, auto &array) {
+    if (a.format_version < since) return;
     std::size_t size = array.size();
     whole(count, size, 1e15);
     a.array(name, array, size);
   };
-  if (a.format_version < 3) return;
-  list("remembered_actions", "support_actions", s.support_actions);
-  if (a.format_version < 4) return;
-  list("rods_in_contact", "contact_stiffness", s.contact_stiffness);
-  if (a.format_version < 5) return;
-  exchangeContacts(a, s, whole);
-  if (a.format_version < 6) return;
-  list("junction_groups", "junction_axes", s.junction_axes);
+  list(3, "remembered_actions", "support_actions", s.support_actions);
+  list(4, "rods_in_contact", "contact_stiffness", s.contact_stiffness);
+  if (a.format_version >= 5) exchangeContacts(a, s, whole);
+  list(6, "junction_groups", "junction_axes", s.junction_axes);
   if (a.format_version < 7) return;
   std::size_t bodies = s.body_rate.size();
   whole("bodies", bodies, 1e15);
@@ -114,12 +111,10 @@ template <class Archive, class AnyContents> void exchange(Archive &a, AnyContent
   a.array("body_position_low", s.body_position_low, bodies);
   a.array("body_rate", s.body_rate, bodies);
   for (std::size_t n = 0; n < memory; ++n) a.array("memory_body_" + std::to_string(n), s.memory[n].body, bodies);
-  if (a.format_version < 8) return;
-  list("joints", "joints", s.joints);
-  if (a.format_version < 9) return;
-  list("rods_that_touch_rods", "rod_contact_stiffness", s.rod_contact_stiffness);
-  if (a.format_version < 10) return;
-  exchangePairs(a, s, whole);
+  list(8, "joints", "joints", s.joints);
+  list(9, "rods_that_touch_rods", "rod_contact_stiffness", s.rod_contact_stiffness);
+  if (a.format_version >= 10) exchangePairs(a, s, whole);
+  list(11, "tendon_numbers", "tendon_memory", s.tendon_memory);
 }
 
 /// Whole turns of cells that were others in the checkpoint: twists of vertices stay as they were, by cells or halves.
@@ -159,6 +154,7 @@ void beginAnew(const Simulation &run, State *state, std::vector<std::string> *to
   state->support_actions.clear();
   state->contacts.clear();
   state->pairs.clear();
+  std::fill(state->tendon_memory.begin(), state->tendon_memory.end(), 0.0);
   state->last_dt = state->dt_before = 0;
   const Configuration c = configurationOf(*state, run.scene, *run.elements, state->time);
   for (std::size_t r = 0; r < run.elements->rods.size(); ++r) {
@@ -335,7 +331,8 @@ void adapt(Found *f, const std::vector<double> &places, const Simulation &run, c
   const std::vector<double> &cells = f->contents.cells;
   const bool other_cells = !cells.empty() && cells != places;
   if (cells.empty() && s.winding.size() != places.size()) s.winding.assign(places.size(), 0.0);
-  const std::size_t rods = run.elements->rods.size();
+  const std::size_t rods = run.elements->rods.size(),
+                    sticks = std::size_t(run.scene.firstMemory(int(run.scene.tendons.size())));
   for (auto stiffness : {&State::contact_stiffness, &State::rod_contact_stiffness})
     if ((s.*stiffness).size() < rods) (s.*stiffness).clear();
   if (s.contacts.size() != rods) s.contacts.clear();
@@ -343,6 +340,7 @@ void adapt(Found *f, const std::vector<double> &places, const Simulation &run, c
   s.junction_axes.resize(run.elements->groups, {Vec3::UnitX(), Vec3::UnitY()});
   for (Rates &rates : s.memory) rates.body.resize(run.scene.bodies.size());
   s.joints.resize(run.scene.joints.size());
+  s.tendon_memory.resize(std::max(s.tendon_memory.size(), sticks));
   if (!f->same_method) {
     s.memory.clear();
     s.strains.clear();

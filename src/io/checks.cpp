@@ -37,7 +37,7 @@ void requireHeld(const Scene &scene) {
   for (const Constraint &c : scene.constraints)
     if (c.isPin() && c.isToWorld() && c.stiffness > 0) held[rootOf(c.rod)] = true;
   for (const Tendon &t : scene.tendons)
-    if (t.actuator.stiffness > 0 &&
+    if ((t.actuator.stiffness > 0 || t.actuator.rigid) &&
         std::any_of(t.points.begin(), t.points.end(), [](const Waypoint &p) { return p.isTold(); }))
       held[rootOf(t.rod)] = true;
   for (int r = 0; r < int(scene.rods.size()); ++r)
@@ -92,6 +92,22 @@ void refuseFrictionOfBodies(const Scene &scene, const Options &o) {
       throw SceneError("body '" + scene.bodies[b].name +
                        "' has friction with colliders, which acts on bodies in steps of time only; write 'contact: "
                        "{friction: 0}' in its block, or take -mode dynamic");
+}
+
+/// The same of rigid tendons.
+void refuseWithRigidTendons(const Scene &scene, const Options &o) {
+  const std::string &name = o.loop.integrator.name;
+  for (const Tendon &t : scene.tendons) {
+    if (!t.actuator.rigid) continue;
+    if (o.loop.dynamic && name != "euler" && name != "bdf2")
+      throw SceneError("option -integrator " + name + ": does not hold tendon '" + t.name +
+                       "', which is rigid, at the ends of its steps; take euler or bdf2, or give it a 'stiffness'");
+    if (const double target = t.actuator.inputAt(0);
+        o.loop.dynamic && (target < 0 || (target > 0 && t.actuator.compression)))
+      throw SceneError("tendon '" + t.name + "': it is rigid, its target begins at " + shortText(target) +
+                       " and it is drawn at 0, from where all would jump in the first step; write a 'table' that "
+                       "begins at 0, or give it a 'stiffness'");
+  }
 }
 
 /// Methods whose stages do not end with their steps hold joints exactly within them only, and their forces swing.
@@ -157,6 +173,7 @@ void checkScene(const Scene &scene, const Options &o, std::vector<std::string> *
   if (!scene.colliders.empty() || scene.touchesMoving()) refuseWithObstacles(o);
   refuseWithRodContact(scene, o);
   refuseWithJoints(scene, o, notes);
+  refuseWithRigidTendons(scene, o);
   refuseFrictionOfBodies(scene, o);
   tellOfImpacts(scene, o, notes);
   if (o.accuracy && scene.isJoined())

@@ -168,9 +168,12 @@ std::string rulesOf(std::string_view block) {
   if (block == "tendons[].path[]")
     return R"("oneOf": [{"required": ["body"]}, {"required": ["rod"]}, {"required": ["joint"]}, {"required": ["cylinder"]}, {"required": ["sphere"]}],
  "dependencies": {"vertex": ["rod"], "edge": ["rod"], "offset": ["edge"], "coefficient": ["joint"], "axis": ["cylinder"], "side": ["cylinder"]},
- "not": {"required": ["vertex", "edge"]})";
+ "not": {"anyOf": [{"required": ["vertex", "edge"]}, {"required": ["joint", "friction"]}]})";
   if (block == "tendons[]")
     return R"("not": {"anyOf": [{"required": ["displacement", "force"]}, {"required": ["displacement", "mckibben"]}, {"required": ["force", "mckibben"]}]})";
+  if (block == "tendons[].displacement")
+    return R"("if": {"required": ["rigid"], "properties": {"rigid": {"const": true}}},
+ "then": {"not": {"anyOf": [{"required": ["stiffness"]}, {"required": ["damping"]}]}}, "else": {"required": ["stiffness"]})";
   if (block == "tendons[].force") return R"("oneOf": [{"required": ["tension"]}, {"required": ["table"]}])";
   if (block == "tendons[].mckibben") return R"("oneOf": [{"required": ["pressure"]}, {"required": ["table"]}])";
   if (block == "contact")

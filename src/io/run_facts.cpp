@@ -49,10 +49,14 @@ std::string textOf(const Motion &m) {
 std::string textOf(const Tendon &t, const Scene &scene) {
   const Actuator &a = t.actuator;
   std::string text = std::string(nameOf(a.kind)) + ", stiffness " + textOf(a.stiffness) + ", damping " +
-                     textOf(a.damping) + (a.compression ? ", pushes" : "");
+                     textOf(a.damping) + (a.compression ? ", pushes" : "") + (a.rigid ? ", rigid" : "");
   if (a.kind == Actuator::Kind::mckibben)
     text += ", braid " + textOf(a.braid_length) + ", " + textOf(a.turns) + " turns, length " + textOf(a.muscle_length) +
             ", above " + textOf(a.minimum_pressure) + " Pa";
+  if (const std::vector<Tendon::Rub> rubs = t.rubs(); !rubs.empty()) {
+    text += ", slip length " + textOf(t.slip_length) + ", friction";
+    for (const Tendon::Rub &r : rubs) text += " " + textOf(r.friction);
+  }
   for (const Tendon::Pull &p : t.joints)
     text += ", " + textOf(p.coefficient) + " of joint '" + scene.joints[std::size_t(p.joint)].name + "'";
   Digest path;

@@ -151,6 +151,11 @@ Entry readEntry(const YamlValue &value, const SceneFile &file, Tendon &out) {
     entry = {Entry::Kind::wrap, int(out.wraps.size())};
     out.wraps.push_back(readWrap(map, file, !cylinder));
   }
+  if (joint) refuse(map, {"tendons[].path[].friction"}, "is for a point, cylinder or sphere");
+  const double friction =
+      map.has("tendons[].path[].friction") ? map.number("tendons[].path[].friction") : -1; // not said
+  if (entry.kind == Entry::Kind::point) out.points.back().friction = friction;
+  if (entry.kind == Entry::Kind::wrap) out.wraps.back().friction = friction;
   map.finish();
   return entry;
 }
@@ -160,6 +165,7 @@ void connect(const std::vector<YamlValue> &values, const std::vector<Entry> &pat
   auto isPoint = [&](std::size_t k) { return k < path.size() && path[k].kind == Entry::Kind::point; };
   std::vector<char> used(out.points.size(), false);
   for (std::size_t k = 0; k < path.size(); ++k) {
+    if (path[k].kind == Entry::Kind::joint) out.joints[std::size_t(path[k].index)].after = int(out.segments.size());
     if (path[k].kind == Entry::Kind::wrap && !(k > 0 && isPoint(k - 1) && isPoint(k + 1)))
       values[k].fail(entry(k) +
                      " must stand between two points, that before and that behind what the tendon winds round");
@@ -175,6 +181,37 @@ void connect(const std::vector<YamlValue> &values, const std::vector<Entry> &pat
       values[k].fail(
           entry(k) +
           " is a point by itself; a straight part lies between two points that follow each other in the list");
+}
+
+/// Friction where it runs over something; that of the tendon where a place has none of its own.
+void readFriction(YamlMap &map, const std::vector<YamlValue> &values, const std::vector<Entry> &path, double length,
+                  Tendon &out) {
+  const double all = map.number("tendons[].friction");
+  std::vector<char> passes(out.points.size(), false); // the tendon goes on behind it
+  for (std::size_t n = 0; n + 1 < out.segments.size(); ++n)
+    if (out.segments[n + 1].from == out.segments[n].to) passes[std::size_t(out.segments[n].to)] = true;
+  for (std::size_t k = 0; k < path.size(); ++k) {
+    const bool point = path[k].kind == Entry::Kind::point;
+    if (path[k].kind == Entry::Kind::joint) continue;
+    const auto index = std::size_t(path[k].index);
+    double &friction = point ? out.points[index].friction : out.wraps[index].friction;
+    const bool own = friction >= 0, ends = point && !passes[index];
+    if (own && ends && friction > 0)
+      values[k].fail(entry(k) + " is an end of a straight part with none behind it, where the tendon does not slide; "
+                                "take its 'friction' away");
+    if (!own) friction = ends ? 0 : all;
+  }
+  if (map.has("tendons[].slip_length") && out.rubs().empty())
+    map.at("tendons[].slip_length").fail("'slip_length' is for a tendon with 'friction'");
+  if (all > 0 && out.rubs().empty())
+    map.at("tendons[].friction")
+        .fail("there is nothing that it rubs on: no point between two others, no cylinder and no sphere");
+  out.slip_length = map.has("tendons[].slip_length") ? map.number("tendons[].slip_length") : 1e-4 * length;
+  if (out.rubs().empty()) return;
+  if (out.actuator.kind == Actuator::Kind::none)
+    map.value().fail("it has 'friction' and no actuator: without tension nothing rubs");
+  if (out.actuator.compression)
+    map.value().fail("it has 'friction' and 'compression: true': a cord that pushes does not lie on what it runs over");
 }
 
 /// How long its parts are as drawn.
@@ -233,11 +270,18 @@ void readActuator(YamlMap &map, double length, Tendon &tendon) {
   if (map.has("tendons[].displacement")) {
     YamlMap block(map.at("tendons[].displacement"), "tendons[].displacement");
     out.kind = Actuator::Kind::displacement;
-    out.stiffness = block.number("tendons[].displacement.stiffness");
+    out.rigid = block.flag("tendons[].displacement.rigid");
+    for (const AnyKey key : {AnyKey("tendons[].displacement.stiffness"), AnyKey("tendons[].displacement.damping")})
+      if (out.rigid && block.has(key))
+        block.at(key).fail("'" + std::string(key->name()) +
+                           "' is of a spring, and the tendon is 'rigid'; take it away");
+    if (!out.rigid && !block.has("tendons[].displacement.stiffness"))
+      block.value().fail("needs the key 'stiffness', or 'rigid: true'");
+    if (!out.rigid) out.stiffness = block.number("tendons[].displacement.stiffness");
     out.damping = block.number("tendons[].displacement.damping");
     out.compression = block.flag("tendons[].displacement.compression");
     readInput(block, "tendons[].displacement.target", "tendons[].displacement.table", false, out);
-    if (out.stiffness == 0 && out.damping == 0)
+    if (!out.rigid && out.stiffness == 0 && out.damping == 0)
       block.value().fail("'stiffness' and 'damping' are both zero: nothing is pulled");
     block.finish();
   }
@@ -295,6 +339,7 @@ void readTendon(const YamlValue &value, SceneFile &out) {
   if (out.scene.rodsOf(tendon).empty())
     value.fail("nothing that it runs through can move: bodies that are free, rods, or joints of such bodies");
   readActuator(map, length, tendon);
+  readFriction(map, entries, path, length, tendon);
   map.finish();
   out.scene.tendons.push_back(std::move(tendon));
 }

@@ -153,6 +153,8 @@ void TrajectoryWriter::writeFrame(const State &state) {
       snapshot.tendon_length.push_back(t.length);
       snapshot.tendon_rate.push_back(t.rate);
       snapshot.tendon_tension.push_back(t.tension);
+      snapshot.tendon_point_tension.insert(snapshot.tendon_point_tension.end(), t.point_tension.begin(),
+                                           t.point_tension.end());
       snapshot.tendon_position.insert(snapshot.tendon_position.end(), t.points.begin(), t.points.end());
     }
   }
@@ -244,7 +246,12 @@ void TrajectoryWriter::writeXdmf() const {
     if (f.place == On::vertices)
       for (XdmfBlock *block : {&rods, &edges}) block->fields.push_back(described(f));
     if (f.place == On::edges) edges.fields.push_back(described(f, true));
-    if (f.place == On::tendon_points && tendon_segments_ > 0) tendons.position = described(f);
+    if (f.place == On::tendon_points && tendon_segments_ > 0) {
+      if (std::string(f.name) == "tendon_position")
+        tendons.position = described(f);
+      else
+        tendons.fields.push_back(described(f));
+    }
     if (f.place != On::bodies) continue;
     if (std::string(f.name) == "body_position")
       bodies.position = described(f);

@@ -56,6 +56,9 @@ static constexpr Field table[] = {
     {"tendon_tension", "N", On::tendons, 1, From::tendons, [](const Snapshot &s) { return s.tendon_tension.data(); }},
     {"tendon_position", "m", On::tendon_points, 3, From::tendons,
      [](const Snapshot &s) { return s.tendon_position[0].data(); }},
+    // Behind each of these points, at the last before it: the same at all where nothing rubs.
+    {"tendon_point_tension", "N", On::tendon_points, 1, From::tendons,
+     [](const Snapshot &s) { return s.tendon_point_tension.data(); }},
     // Where obstacles stand, and quaternions w, x, y, z from their axes to the world's; where any moves.
     {"collider_position", "m", On::colliders, 3, From::motion,
      [](const Snapshot &s) { return s.collider_position[0].data(); }},

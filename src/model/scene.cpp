@@ -294,6 +294,17 @@ std::vector<int> Scene::rodsOf(const Tendon &tendon) const {
   return all;
 }
 
+bool Scene::tendonsRub() const {
+  return whole ? whole->tendons_rub
+               : std::any_of(tendons.begin(), tendons.end(), [](const Tendon &t) { return !t.rubs().empty(); });
+}
+
+int Scene::firstMemory(int tendon) const {
+  int count = 0;
+  for (int k = 0; k < tendon; ++k) count += tendons[std::size_t(k)].remembered();
+  return count;
+}
+
 bool Scene::tendonsTwist() const {
   return std::any_of(tendons.begin(), tendons.end(), [](const Tendon &t) {
     return std::any_of(t.points.begin(), t.points.end(),

@@ -85,6 +85,7 @@ State initialState(const Scene &scene, const Elements &elements) {
                            body.angular_velocity, all.inertia * body.angular_velocity});
   }
   s.joints.resize(scene.joints.size());
+  s.tendon_memory.resize(std::size_t(scene.firstMemory(int(scene.tendons.size()))));
   const Configuration c = configurationOf(s, scene, elements, 0);
   for (std::size_t r = 0; r < scene.rods.size(); ++r) {
     const Rod &rod = scene.rods[r];

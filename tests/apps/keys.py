@@ -112,6 +112,12 @@ def exampleScene(path, value):
         else:
             entry.setdefault("body", "cube")
             tendon["path"] = [from_world, entry]
+        if name in ("friction", "slip_length"):  # a point between two others, that an actuator draws the tendon over
+            tendon["path"] = [from_world, entry, {"body": "world", "point": [0.5, 0, -2]}]
+            tendon.setdefault("friction", 0.2)
+            put(scene, "tendons[].force.tension", 10)
+        if path.startswith("tendons[].displacement.") and name != "rigid":
+            put(scene, "tendons[].displacement.stiffness", tendon["displacement"].get("stiffness", 1e4))
         if "table" not in tendon.get("force", {"table": 0}):
             put(scene, "tendons[].force.tension", 10)
         if "table" not in tendon.get("mckibben", {"table": 0}):

@@ -340,6 +340,17 @@ def bodiesTouch(tmp):
     print("bodies that touch rods and each other go on to the same bits")
 
 
+def tendonsRub(tmp):
+    """A finger's tendon that rubs, as it is let go."""
+    base = ["-scene", source + "/data/scenes/finger_rubs.yaml", "-dt", 2**-6]
+    run(0, *base, "-t_end", 3.25, "-output_dir", tmp + "/half")
+    run(0, *base, "-t_end", 3.5, "-restart", tmp + "/half/checkpoint.h5", "-output_dir", tmp + "/on")
+    run(0, *base, "-t_end", 3.5, "-output_dir", tmp + "/whole")
+    same(final(tmp + "/on"), final(tmp + "/whole"))
+    assert (np.abs(final(tmp + "/on")["tendon_memory"]) > 1e-6).all()
+    print("tendons that rub go on to the same bits")
+
+
 def joined(tmp):
     """Rods that junctions join, rigidly and by a ball, under a pin that moves, and springs between vertices: frames and
     reactions go on to the same bits."""
@@ -507,7 +518,7 @@ def full(tmp):
     print("full disks are told,", with_frames, "with frames")
 
 
-for test in (letGo, changes, balances, folders, automatic, orders, touching, amongRods, bodiesTouch, joined, signals, full):
+for test in (letGo, changes, balances, folders, automatic, orders, touching, amongRods, bodiesTouch, tendonsRub, joined, signals, full):
     if len(sys.argv) > 3 and test.__name__ not in sys.argv[3:]:
         continue
     with tempfile.TemporaryDirectory() as folder:

@@ -1,8 +1,8 @@
 /// Tendons and actuators: reference values, derivatives of the whole term, momenta.
 #include "tendril/energy/tendon.hpp"
 
+#include "support/mechanisms.hpp"
 #include "support/random_cell.hpp"
-#include "support/touching.hpp"
 #include "tendril/coupling/couplings.hpp"
 
 namespace tendril::test {
@@ -105,17 +105,6 @@ Tendon springThrough(const std::string &name, std::vector<Waypoint> points) {
   t.actuator.input = -0.05;
   return t;
 }
-Waypoint ofBody(int body, const Vec3 &point) {
-  Waypoint p;
-  p.body = body;
-  p.point = point;
-  return p;
-}
-Waypoint ofWorld(const Vec3 &point) {
-  Waypoint p;
-  p.point = point;
-  return p;
-}
 Waypoint ofEdge(int rod, int edge, const Vec3 &arm) {
   Waypoint p;
   p.rod = rod;
@@ -185,9 +174,10 @@ struct InAStep {
   std::vector<TouchingPair> pairs;
   RodSet all{0, 2};
 
-  explicit InAStep(const Scene &scene) { start(scene); }
-  void start(const Scene &scene) {
+  explicit InAStep(const Scene &scene, double stick = 0) { start(scene, stick); }
+  void start(const Scene &scene, double stick) {
     EXPECT_PETSC(sim.setUp(scene, dynamics(0.01, 1)));
+    std::fill(sim.state.tendon_memory.begin(), sim.state.tendon_memory.end(), stick);
     const Step step = TimeLoop::stepOf(dynamics(0.01, 1), sim.state, 0.01);
     EXPECT_PETSC(sim.solver.begin(sim.state, step));
     term = makeTendons(sim.scene, *sim.elements);
@@ -203,8 +193,7 @@ struct InAStep {
   }
 };
 
-TEST(Tendons, HaveTheDerivativesOfTheirEnergy) {
-  const Scene scene = tendonScene();
+void expectDerivatives(const Scene &scene) {
   InAStep step(scene);
   Simulation &sim = step.sim;
   IncrementalPotential &potential = *sim.potential;
@@ -233,6 +222,7 @@ TEST(Tendons, HaveTheDerivativesOfTheirEnergy) {
   for (int r = 0; r < 2; ++r) { // tensions as the displacements have them
     step.term->setTrialForces(here, sim.dofs.makePlanes(), 1, r, here);
     step.term->moveIterate(here, r);
+    step.term->renew(here, r);
   }
   Derivatives d = step.derivatives(here);
   for (int k = 0; k < 8; ++k) {
@@ -260,11 +250,26 @@ TEST(Tendons, HaveTheDerivativesOfTheirEnergy) {
   }
 }
 
+TEST(Tendons, HaveTheDerivativesOfTheirEnergy) { expectDerivatives(tendonScene()); }
+
+/// Everywhere: over points of all kinds, round cylinders and spheres that bodies and the world carry.
+Scene rubbing(Scene scene, double slip) {
+  for (Tendon &t : scene.tendons) {
+    t.slip_length = slip;
+    for (Waypoint &p : t.points) p.friction = 0.3;
+    for (Wrap &w : t.wraps) w.friction = 0.6;
+  }
+  return scene;
+}
+/// Once where it sticks, once where it slides.
+TEST(Tendons, HaveTheDerivativesOfTheirEnergyWhereTheyRub) {
+  for (const double slip : {2.0, 1e-4}) expectDerivatives(rubbing(tendonScene(), slip));
+}
+
 /// Tensions between what is free leave momenta alone: of all but the points of the world.
-TEST(Tendons, LeaveMomentaAlone) {
-  Scene scene = tendonScene();
+void expectMomentaAlone(Scene scene, double stick = 0) {
   scene.tendons = {scene.tendons[1], scene.tendons[3]};
-  InAStep step(scene);
+  InAStep step(scene, stick);
   const Configuration &c = step.sim.potential->start();
   const Derivatives d = step.derivatives(c, HessianKind::none);
   Vec3 force = Vec3::Zero(), moment = Vec3::Zero();
@@ -283,6 +288,14 @@ TEST(Tendons, LeaveMomentaAlone) {
   EXPECT_GT(size, 50);
   EXPECT_LT(force.norm(), 1e-14 * size);
   EXPECT_LT(moment.norm(), 1e-14 * size);
+}
+TEST(Tendons, LeaveMomentaAlone) { expectMomentaAlone(tendonScene()); }
+/// At the start what is drawn is the stick: some, and all that friction takes.
+TEST(Tendons, LeaveMomentaAloneWhereTheyRub) {
+  for (const double stick : {0.3, -2.0}) {
+    Scene scene = rubbing(tendonScene(), 1);
+    expectMomentaAlone(scene, stick);
+  }
 }
 
 /// The nine-link finger by the places of its bones, against the table: displacement, slopes, second derivatives.

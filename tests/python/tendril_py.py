@@ -320,6 +320,7 @@ def tendons(folder):
         field = t.field("tendon_" + name)
         assert field.unit == unit and field.shape == (len(t.time), *places[field.place]), field
         assert (field.place == "tendon_points") == (name == "position")
+    assert (bent.point_tension(slice(None)) == bent.tension(slice(None))[:, None]).all(), "nothing rubs"
     frames = slice(None)
 
     def drawn(tendon):

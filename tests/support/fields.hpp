@@ -20,7 +20,7 @@ template <class T, class... Made> constexpr std::size_t fieldCount() {
 template <class T, class Visit> void eachField(T &s, Visit visit) {
   constexpr std::size_t n = fieldCount<T>();
   auto all = [&](auto &...fields) { (visit(fields), ...); };
-  static_assert(n == 5 || n == 6 || n == 7 || (n >= 11 && n <= 23), "add a line for this number of fields");
+  static_assert(n == 5 || n == 6 || n == 7 || (n >= 11 && n <= 24), "add a line for this number of fields");
   if constexpr (n == 5) {
     auto &[a, b, c, d, e] = s;
     all(a, b, c, d, e);
@@ -69,6 +69,9 @@ template <class T, class Visit> void eachField(T &s, Visit visit) {
   } else if constexpr (n == 23) {
     auto &[a, b, c, d, e, f, g, h, i, j, k, l, m, o, p, q, r, t, u, v, w, x, y] = s;
     all(a, b, c, d, e, f, g, h, i, j, k, l, m, o, p, q, r, t, u, v, w, x, y);
+  } else if constexpr (n == 24) {
+    auto &[a, b, c, d, e, f, g, h, i, j, k, l, m, o, p, q, r, t, u, v, w, x, y, z] = s;
+    all(a, b, c, d, e, f, g, h, i, j, k, l, m, o, p, q, r, t, u, v, w, x, y, z);
   }
 }
 

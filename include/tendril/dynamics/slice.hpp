@@ -31,11 +31,12 @@ private:
     std::vector<int> rods, groups; ///< groups of junctions, then bodies
     std::vector<int> bodies;
     std::vector<int> joints;  ///< between bodies
+    std::vector<int> sticks;  ///< that tendons remember
     std::vector<int> holders; ///< that move: those of movingHolders, and behind them movingObstacles
   };
   Team team_;
   std::vector<Part> parts_; ///< by rank
-  int groups_ = 0, bodies_ = 0, joints_ = 0, holders_ = 0;
+  int groups_ = 0, bodies_ = 0, joints_ = 0, sticks_ = 0, holders_ = 0;
   class Transfer;
 };
 

@@ -11,7 +11,8 @@ struct WayLength {
   double value = 0;
   Eigen::Matrix<double, 6, 1> gradient = Eigen::Matrix<double, 6, 1>::Zero();
   Eigen::Matrix<double, 6, 6> hessian = Eigen::Matrix<double, 6, 6>::Zero();
-  double angle = 0; ///< that it winds by [rad]; 0 of a straight one
+  double angle = 0;   ///< that it winds by [rad]; 0 of a straight one
+  double turning = 0; ///< of its direction over that arc [rad]: less round a cylinder that it climbs along
 };
 
 /// Of the straight way; infinite where both ends are one.

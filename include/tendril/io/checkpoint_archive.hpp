@@ -14,7 +14,7 @@ namespace tendril {
 inline constexpr const char *checkpoint_format = "tendril-checkpoint";
 /// 1 had no names, hashes and checksum, 2 no actions of supports, 3 no contact, 4 no friction, 5 no
 /// junctions, 6 no bodies.
-inline constexpr int checkpoint_version = 10;
+inline constexpr int checkpoint_version = 11;
 inline constexpr int most_memory = 8; ///< more than any integrator remembers
 
 /// Writes numbers, texts and arrays by name, and a checksum over all.

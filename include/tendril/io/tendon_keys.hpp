@@ -44,10 +44,21 @@ inline constexpr Key tendon_keys[] = {
      "of the cylinder: 0 the nearer one; 1 anticlockwise about the axis from the point before to the point behind, -1 "
      "clockwise, up to three quarters of a turn",
      Bounds{-1, 1}, "", "1"},
+    {"tendons[].path[].friction", KeyType::number, "", "(that of the tendon)",
+     "coefficient of the tendon on this point, cylinder or sphere", not_negative, "", "0.3"},
+    {"tendons[].friction", KeyType::number, "", "0",
+     "coefficient on all points between the first and the last, and on what it winds round: where it slides over a "
+     "turn "
+     "by an angle, the tension changes by the factor exp(friction times angle); the first entry is the actuator's end",
+     not_negative, "", "0.3"},
+    {"tendons[].slip_length", KeyType::number, "m", "(1e-4 of the length as drawn)",
+     "way over which friction comes to its limit", positive, "", "1e-4"},
     {"tendons[].displacement", KeyType::map, "", "(none)",
      "an actuator: a spring with a damper, which draws the tendon's displacement, 0 as drawn, to a target"},
-    {"tendons[].displacement.stiffness", KeyType::number, "N/m", "required",
+    {"tendons[].displacement.stiffness", KeyType::number, "N/m", "(or rigid)",
      "of the spring, EA over the length of a cord", not_negative, "", "1e4"},
+    {"tendons[].displacement.rigid", KeyType::flag, "", "false",
+     "whether the displacement does not go beyond the target at all, in place of a spring", anything, "", "true"},
     {"tendons[].displacement.damping", KeyType::number, "N s/m", "0", "of the damper", not_negative, "", "10"},
     {"tendons[].displacement.target", KeyType::number, "m", "0",
      "displacement at which the spring is slack: a negative one pulls the tendon in", anything, "", "-0.05"},

@@ -40,7 +40,8 @@ struct Snapshot {
   RodActions actions;
   std::vector<double> constraint_deviation = {}, constraint_force = {}, joint_coordinate = {};
   std::vector<Vec3> joint_distance = {}, joint_force = {}, joint_moment = {};
-  std::vector<double> tendon_displacement = {}, tendon_length = {}, tendon_rate = {}, tendon_tension = {};
+  std::vector<double> tendon_displacement = {}, tendon_length = {}, tendon_rate = {}, tendon_tension = {},
+                      tendon_point_tension = {};
   std::vector<Vec3> tendon_position = {};
   std::vector<ContactReading> contacts = {};
   std::vector<Vec3> contact_force = {}, collider_force = {}, collider_moment = {}, collider_position = {};

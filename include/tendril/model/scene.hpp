@@ -159,6 +159,10 @@ struct Scene {
   /// Bodies that a tendon pulls on, and rods, with those that bodies have; each once.
   std::vector<int> bodiesOf(const Tendon &tendon) const;
   std::vector<int> rodsOf(const Tendon &tendon) const;
+  /// Whether tendons rub on what they run over; and of what State::tendon_memory has of all: the first of a tendon, of
+  /// their number how many.
+  bool tendonsRub() const;
+  int firstMemory(int tendon) const;
   /// Whether a tendon runs through points beside the axis of a rod, which its twist moves.
   bool tendonsTwist() const;
   /// Whether junctions, ties, bodies or tendons join rods.
@@ -181,7 +185,7 @@ struct Scene {
   /// What is asked of the whole scene, where this is the part of it that one rank has: what a run does follows from
   /// all rods, whichever rank has them.
   struct Whole {
-    bool strains_dissipate, slides, has_couples, touches_rods, touches_bodies, slides_among_moving;
+    bool strains_dissipate, slides, has_couples, touches_rods, touches_bodies, slides_among_moving, tendons_rub;
     std::int64_t edges;
   };
   std::optional<Whole> whole;
@@ -225,7 +229,7 @@ struct Scene {
   /// Whether friction or damping with obstacles acts on any rod.
   bool slides() const;
   /// The same with obstacles, or among rods and bodies.
-  bool hasFriction() const { return slides() || slidesAmongMoving(); }
+  bool hasFriction() const { return slides() || slidesAmongMoving() || tendonsRub(); }
 };
 
 /// The scene with some of its rods only, in any order, and what holds, joins and pulls them.

@@ -25,6 +25,7 @@ struct Actuator {
   Motion input_motion;               ///< ... of which it is the displacement along x
   double stiffness = 0, damping = 0; ///< [N/m], [N s/m]
   bool compression = false;          ///< whether it may push, too
+  bool rigid = false;                ///< of a displacement: not beyond the target, in place of a spring
   /// Of a muscle: its length as drawn, that of a thread of its braid, the turns of this about it, and the pressure
   /// below which it does nothing [m], [m], -, [Pa].
   double muscle_length = 0, braid_length = 0, turns = 0, minimum_pressure = 0;
@@ -50,7 +51,8 @@ struct Waypoint {
   double at = 0;           ///< part of the edge
   /// As drawn [m]; of an edge from its axis along the tangent and both directors.
   Vec3 point = Vec3::Zero();
-  Motion motion; ///< of one of the world
+  Motion motion;       ///< of one of the world
+  double friction = 0; ///< coefficient of the tendon on it
 
   bool isTold() const { return body < 0 && rod < 0; }
   /// Whether an end of an edge, with no arm.
@@ -72,6 +74,7 @@ struct Wrap {
   /// 0: round the nearer side, where the straight way meets it; 1, -1: anticlockwise or clockwise about the axis, from
   /// the first point to the second, always.
   int side = 0;
+  double friction = 0; ///< coefficient of the tendon on it
 };
 
 struct Tendon {
@@ -83,6 +86,15 @@ struct Tendon {
   struct Pull {
     int joint;
     double coefficient; ///< [1] or [m/rad]
+    int after = 0;      ///< how many segments the path has before it
+  };
+  /// A place where it rubs: what it winds round, or the point at the end of a segment. Behind it the tension is
+  /// another. Of parts with one tension every segment has one, or two where it may wind round something.
+  struct Rub {
+    int segment;
+    bool winds;
+    int part; ///< behind it
+    double friction;
   };
   static constexpr int drawn_points = 17; ///< where it winds round something, beside its own
   std::string name;
@@ -91,7 +103,8 @@ struct Tendon {
   std::vector<Wrap> wraps;
   std::vector<Pull> joints; ///< displacement has coefficient times coordinate of these
   Actuator actuator;
-  int rod = 0; ///< the first of those that it pulls on, or that its bodies are tied to (Scene::hostBodies)
+  double slip_length = 0; ///< way over which friction comes to its limit [m]
+  int rod = 0;            ///< the first of those that it pulls on, or that its bodies are tied to (Scene::hostBodies)
 
   /// Slots beside its rod: one with its actuator's input for a position along x, then those of points that are told.
   int slots() const {
@@ -104,7 +117,31 @@ struct Tendon {
     for (const Segment &s : segments) count += s.wrap < 0 ? 0 : drawn_points;
     return count;
   }
+  /// How many numbers a state remembers: by how much it is drawn at each place where it rubs, up to where it slides
+  /// [m]; and of a rigid one the tension [N].
+  int remembered() const { return int(rubs().size()) + actuator.rigid; }
   bool dissipates() const { return actuator.damping > 0; }
+  /// First of the parts of a segment; of the number of segments: how many parts there are.
+  int firstPart(int segment) const {
+    int count = 0;
+    for (int n = 0; n < segment; ++n) count += segments[std::size_t(n)].wrap < 0 ? 1 : 2;
+    return count;
+  }
+  int parts() const { return firstPart(int(segments.size())); }
+  /// In the order of its path, which begins at the actuator.
+  std::vector<Rub> rubs() const {
+    std::vector<Rub> all;
+    for (int n = 0, part = 0; n < int(segments.size()); ++n) {
+      const Segment &s = segments[std::size_t(n)];
+      if (s.wrap >= 0 && ++part > 0 && wraps[std::size_t(s.wrap)].friction > 0)
+        all.push_back({n, true, part, wraps[std::size_t(s.wrap)].friction});
+      ++part;
+      const bool goes_on = n + 1 < int(segments.size()) && segments[std::size_t(n) + 1].from == s.to;
+      if (goes_on && points[std::size_t(s.to)].friction > 0)
+        all.push_back({n, false, part, points[std::size_t(s.to)].friction});
+    }
+    return all;
+  }
   /// Whether its actuator is given a table, or points of it move as they are told.
   bool isMoved() const {
     return actuator.input_motion.moves() ||

@@ -85,9 +85,11 @@ struct State {
   std::vector<double>
       winding; ///< (cells) 2 pi x whole turns of the twist angle, carried by continuity (`angle` measure) [rad]
   std::vector<JointState> joints; ///< (nj)
-  double last_dt = 0;             ///< length of the step that led here; 0 where the integrator remembers nothing [s]
-  double dt_before = 0;           ///< of the step before that; 0 where there was none [s]
-  std::vector<Rates> memory;      ///< what the integrator remembers of steps before
+  /// All of a tendon (Tendon::remembered), then of the next.
+  std::vector<double> tendon_memory;
+  double last_dt = 0;        ///< length of the step that led here; 0 where the integrator remembers nothing [s]
+  double dt_before = 0;      ///< of the step before that; 0 where there was none [s]
+  std::vector<Rates> memory; ///< what the integrator remembers of steps before
   std::vector<double>
       strains; ///< before the last step, as strainsOf, then before the one before; where the integrator wants them
   /// What supports, constraints and obstacles that move did at the end of the last step, then of the one before
