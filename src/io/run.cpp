@@ -75,12 +75,6 @@ void tellTimeError(const Diagnostics &last, const Options &o, Progress &progress
   writeTimeError(o.output_dir + "/trajectory.h5", with_rounding);
 }
 
-std::string textOf(const SceneSource &source) {
-  std::string text = source.text;
-  for (const auto &[path, content] : source.files) text += '\0' + path + '\0' + content;
-  return text;
-}
-
 /// The command line, as far as it stands alone. \throws SceneError
 void readCommandLine(int argc, char **argv, const OptionFiles &files, Options *o) {
   {
@@ -97,7 +91,7 @@ void readCommandLine(int argc, char **argv, const OptionFiles &files, Options *o
 
 /// What a restart asks of the run that it goes on with.
 RunFacts factsOf(const Simulation &run, const Options &o, const SceneSource &source) {
-  RunFacts facts(run.scene, o.loop, textOf(source));
+  RunFacts facts(run.scene, o.loop, source.all());
   for (const char *name : {"snes_rtol", "snes_max_it"}) {
     const std::string option = std::string("-") + name;
     char value[64];

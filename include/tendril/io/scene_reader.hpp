@@ -25,6 +25,12 @@ struct SceneSource {
   std::vector<std::pair<std::string, std::string>>
       files;                      ///< path as written and content of each text file that it names
   std::vector<std::string> paths; ///< of all files it was read from
+  /// The text, and path and content of all files, as one.
+  std::string all() const {
+    std::string sum = text;
+    for (const auto &[path, content] : files) sum += '\0' + path + '\0' + content;
+    return sum;
+  }
 };
 
 struct SceneFile {
