@@ -82,6 +82,8 @@ def title(t, name):
 
 def is_static(t):
     """Whether nothing moves: the times of frames are then load factors, which may fall as well as rise."""
+    if hasattr(t, "time_name"):
+        return True
     if "velocity" not in t.field_names or len(t.time) < 2:
         return False
     if "body_velocity" in t.field_names and np.any(t.field("body_velocity")[len(t.time) - 1]):
