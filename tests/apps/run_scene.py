@@ -45,9 +45,11 @@ def number(source, output, folder):
     try:
         with Trajectory(folder) as t:
             group, _, name = name.rpartition("/")
-            values = {"state": t.field, "diagnostics": t.diagnostics.__getitem__, "critical": lambda _: t.critical, "": lambda _: t.time}
+            values = {"state": t.field, "modes": lambda key: getattr(t.modes, key),
+                      "diagnostics": t.diagnostics.__getitem__, "critical": lambda _: t.critical,
+                      "": lambda _: t.time}
             return float(values[group](name)[tuple(int(i) for i in indices.split(","))])
-    except (KeyError, ValueError, IndexError, TypeError) as e:
+    except (KeyError, ValueError, IndexError, TypeError, AttributeError) as e:
         return str(e)
 
 

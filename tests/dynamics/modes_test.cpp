@@ -331,18 +331,26 @@ TEST(Modes, OfABodyThatHasBeenTurned) {
     EXPECT_NEAR(turned.eigenvalue[k], drawn.eigenvalue[k], 1e-7 * drawn.eigenvalue[k]);
 }
 
-/// A rigid body on a hinge to the world: omega^2 = m g l over its moment about the hinge.
-TEST(Modes, OfAPhysicalPendulum) {
+/// Two balls of 2 kg and 1 kg that hang below each other on hinges, 0.3 and 0.4 long, with their own inertia.
+TEST(Modes, OfADoublePendulum) {
   const Folder folder;
   const Scene scene = readScene(folder.write("pendulum.yaml", R"(gravity: [0, -9.81, 0]
 bodies:
-  - {name: bob, mass: 2, inertia: [0.02, 0.05, 0.06], centre: [0.3, 0, 0], rotation: [0, 0, -1.5707963267948966]}
+  - {name: upper, mass: 2, inertia: [0.02, 0.03, 0.04], position: [0, -0.3, 0], centre: [0, 0, 0]}
+  - {name: lower, mass: 1, inertia: [0.02, 0.03, 0.01], position: [0, -0.7, 0], centre: [0, 0, 0]}
 joints:
-  - {name: pivot, type: hinge, child: bob, point: [0, 0, 0], axis: [0, 0, 1]}
+  - {name: pivot, type: hinge, child: upper, point: [0, 0, 0], axis: [0, 0, 1]}
+  - {name: elbow, type: hinge, child: lower, parent: upper, point: [0, -0.3, 0], axis: [0, 0, 1]}
 )"))
                           .scene;
-  // An exact joint gives way by 1e-6 of what else holds the body.
-  EXPECT_NEAR(modesOf(scene, 1, 0).eigenvalue[0], 2 * 9.81 * 0.3 / (0.06 + 2 * 0.09), 1e-5 * 24);
+  const Modes modes = modesOf(scene, 2, 0);
+  Eigen::Matrix2d mass, stiffness; // by both angles from the vertical
+  mass << 3 * 0.09 + 0.04, 0.12, 0.12, 0.16 + 0.01;
+  stiffness << 3 * 9.81 * 0.3, 0, 0, 9.81 * 0.4;
+  const Eigen::Vector2d exact =
+      Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix2d>(stiffness, mass).eigenvalues();
+  // An exact joint gives way by 1e-6 of what else holds its bodies.
+  for (const int k : {0, 1}) EXPECT_NEAR(modes.eigenvalue[std::size_t(k)], exact[k], 1e-5 * exact[k]);
 }
 
 /// Modes are orthonormal by the masses, and rods that nothing joins have theirs each.

@@ -224,6 +224,33 @@ def statics(folder):
     assert t.options["mode"] == "static" and t.unit("critical_error") == "1"
 
 
+def modes(folder):
+    command = [program, "-options_file", "options/cases/hung_spring_modes.yaml", "-output_dir", folder + "/out"]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, cwd=source)
+    t = Trajectory(folder + "/out")
+    m, body = t.modes, t.bodies["cube"]
+    assert m.frequency.shape == m.growth_rate.shape == (7,) and np.all(np.diff(m.eigenvalue) > 0)
+    assert m.frequency[0] == 0 and np.allclose(m.frequency[1:] ** 2, m.eigenvalue[1:], rtol=1e-14)
+    assert t.unit("modes/shape") == "m" and t.unit("modes/frequency") == "rad/s"
+    # Orthonormal by the masses: of vertices, edges about their tangents, and the body about its centre of mass.
+    x, rod = t.rods[0].reference("position"), t.rods[0]
+    length = np.linalg.norm(np.diff(x, axis=0), axis=1)
+    mass = rod.material["linear_density"] * (np.append(length, 0) + np.append(0, length)) / 2
+    mass[-1] = 0  # it is the body's
+    spin = rod.material["linear_rotational_inertia"] * length
+    now = body.axes()
+    centre = m.body_shape[:, 0] + np.cross(m.body_rotation[:, 0], now @ (body.centre - [1.35, 0, 0]))
+    product = np.einsum("kvi,v,lvi->kl", m.shape, mass, m.shape) + np.einsum("ke,e,le->kl", m.twist, spin, m.twist)
+    inertia = now @ body.inertia @ now.T
+    product += body.mass * centre @ centre.T + m.body_rotation[:, 0] @ inertia @ m.body_rotation[:, 0].T
+    assert np.allclose(product, np.eye(7), atol=1e-8), product
+    # The end of the rod is a point of the body.
+    arm = rod.position()[-1] - body.position()
+    assert np.allclose(m.shape[:, -1], m.body_shape[:, 0] + np.cross(m.body_rotation[:, 0], arm), atol=1e-10)
+    with Trajectory(source + "/tests/data/format_1.h5") as old:
+        assert old.modes is None
+
+
 def format_1():
     t = Trajectory(source + "/tests/data/format_1.h5")
     assert t.format_version == 1 and sorted(t.field_names) == sorted(PLACES) and len(t.time) == 3
@@ -409,6 +436,8 @@ with tempfile.TemporaryDirectory() as main, tempfile.TemporaryDirectory() as oth
     killed(other)
     shutil.rmtree(other + "/out")
     statics(other)
+    shutil.rmtree(other + "/out")
+    modes(other)
     shutil.rmtree(other + "/out")
     tendons(other)
     format_1()

@@ -24,8 +24,8 @@ struct Step {
   double load_factor = 1; ///< on gravity, forces, torques and moments
   bool mixed = true;      ///< axial force as its own unknown, condensed edge by edge
   HessianKind hessian = HessianKind::exact;
-  /// Statics whose Hessian tells small motions: exact joints are as stiff between updates of their forces as in dynamics,
-  /// and nothing keeps bodies from turning that are free to.
+  /// Statics whose Hessian tells small motions: exact joints are as stiff between updates of their forces as in
+  /// dynamics, and nothing keeps bodies from turning that are free to.
   bool small_motions = false;
   const StageRule *rule = nullptr; ///< of the stage, with the same dt; IncrementalPotential::beginStep takes
                                    ///< backward Euler where a step in time has none
