@@ -434,7 +434,7 @@ rows = [
     ("rigid tendon with a damper", pulled("displacement: {rigid: true, damping: 1}"), [], ["scene.yaml:12", "'damping' is of a spring, and the tendon is 'rigid'"]),
     ("rigid that is no flag", pulled("displacement: {rigid: very}"), [], ["scene.yaml:12", "'rigid'"]),
     ("rigid tendon that jumps", pulled("displacement: {rigid: true, target: -0.1}"), [], ["tendon 't': it is rigid", "its target begins at -0.1"]),
-    ("rigid tendon in half steps", pulled("displacement: {rigid: true}"), ["-integrator", "midpoint"], ["does not hold tendon 't'", "take euler or bdf2"]),
+    ("rigid tendon in half steps", pulled("displacement: {rigid: true}"), ["-integrator", "generalized_alpha"], ["does not hold tendon 't'", "take euler or bdf2"]),
     ("two actuators", pulled("force: {tension: 1}, displacement: {stiffness: 1}"), [], ["scene.yaml:12", "one actuator", "two tendons"]),
     ("tension of no size", pulled("force: {}"), [], ["scene.yaml:12", "needs a 'tension' or a 'table'"]),
     ("negative tension", pulled("force: {tension: -1}"), [], ["scene.yaml:12", "'tension' must not be negative"]),
