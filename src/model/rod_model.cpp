@@ -29,7 +29,7 @@ std::string whatJoins(const Scene &scene, int r) {
   return {};
 }
 
-/// What more than a barrier or penalty against its axis acts on a rod.
+/// What a rod may touch.
 std::string whatTouches(const Scene &scene, int r) {
   if (scene.touches(r)) return "it may touch colliders";
   if (scene.rods[r].contact.touchesMoving()) return "it may touch rods or bodies";

@@ -84,7 +84,23 @@ def proofs():
         assert "-model_check" in told, told
 
 
+def frequencies():
+    """Planar rods have the modes of full ones in their plane: of a strip that sags, the first is out of it."""
+    text = COLUMN.format(gravity="[3, 0, 0]", out=1, within=1).replace("mode: static, load_steps: 10", "mode: static")
+    text = text.replace("linear_density: 1,", "linear_density: 1, linear_rotational_inertia: 0,")
+    found = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for model in ("full", "planar"):
+            run(folder, text, "-model", model, "-mode", "modes", "-modes", "4", output=model)
+            with h5py.File(f"{folder}/{model}/trajectory.h5") as f:
+                found[model] = f["modes/frequency"][:]
+    of_plane = found["planar"][:2]
+    assert np.allclose(of_plane, [found["full"][np.abs(found["full"] - w).argmin()] for w in of_plane], rtol=1e-7), found
+    assert found["full"][0] < of_plane[0] * (1 - 1e-3), found
+
+
 buckling()
 restarts()
 proofs()
+frequencies()
 print("models hold")
