@@ -276,6 +276,7 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
     add(Kind::scene, "law" + of,
         std::string(rod.measure == Measure::tan ? "measure tan" : "measure angle") +
             (rod.energy == Energy::seed ? ", energy seed" : ", energy classical") +
+            (rod.bends() && rod.model != RodModel::full ? std::string(", model ") + nameOf(rod.model) : "") +
             (rod.gravity ? "" : ", without gravity"));
     Digest shape;
     shape.add(rod.position.data(), rod.position.size() * sizeof(Vec3));
