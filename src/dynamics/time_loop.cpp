@@ -251,7 +251,8 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
     }
     if (widen && step.report.converged && !step.too_coarse) {
       bool widened = false;
-      PetscCall(widen(next, step.report.first_negative_pivots > 0, &widened));
+      PetscCall(widen(next, step.report.first_negative_pivots > 0, &widened, &failure_));
+      if (!failure_.empty()) PetscFunctionReturn(0);
       if (widened) {
         if (begun_here) control.energy = NAN;
         prepare(state);

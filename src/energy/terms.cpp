@@ -23,11 +23,10 @@ std::vector<std::unique_ptr<Term>> makeRodTerms(const Scene &scene, const Elemen
 Vec3 momentOn(const Elements &elements, const Planes &cells, const Configuration &c, int rod, int frame) {
   Vec3 sum = Vec3::Zero();
   for (const LooseCell &cell : heldCells(elements, rod, frame)) {
-    const Frame f0 = c.frameAt(cell.frame0), f1 = c.frameAt(cell.frame1);
-    const CellOf<double> k = cellOf<double>(cells, c, cell.slot);
-    const auto gradient = elements.measure[rod] == Measure::tan ? cellGradient<Measure::tan>(f0, f1, k)
-                                                                : cellGradient<Measure::angle>(f0, f1, k);
-    const Vec3 moment = cellMoment(f0, f1, k, gradient);
+    const auto [f, k] = presentCell<double>(elements, cells, c, rod, cell);
+    const auto gradient = elements.measure[rod] == Measure::tan ? cellGradient<Measure::tan>(f[0], f[1], k)
+                                                                : cellGradient<Measure::angle>(f[0], f[1], k);
+    const Vec3 moment = cellMoment(f[0], f[1], k, gradient);
     sum += cell.frame1 == frame ? moment : Vec3(-moment);
   }
   return sum;

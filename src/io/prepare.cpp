@@ -93,7 +93,7 @@ static Scene sceneFor(Prepared &prepared, Options &o) {
   if (o.gravity) file.scene.gravity = *o.gravity;
   resolve(file.run, o);
   for (Rod &rod : file.scene.rods) rod.chooses_model = rod.chooses_model && o.modes == 0; // modes are in all directions
-  settleModels(file.scene, o.loop.dynamic,
+  settleModels(file.scene, o.loop.dynamic || o.modes > 0,
                Team::world().isAlone() && (o.loop.dynamic || o.loop.continuation == Continuation::load),
                &prepared.notes);
   checkScene(file.scene, o, &prepared.notes);
@@ -127,11 +127,11 @@ PetscErrorCode unite(Prepared &prepared, const Options &o, std::string *line) {
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode leavePlanes(Prepared &prepared, const Options &o) {
+PetscErrorCode leaveModel(RodModel model, Prepared &prepared, const Options &o) {
   PetscFunctionBeginUser;
   Simulation &run = *prepared.run;
   State state = std::move(run.state);
-  PetscCall(run.setUp(freeOfPlanes(run.scene), o.loop));
+  PetscCall(run.setUp(freeOf(model, run.scene), o.loop));
   run.state = std::move(state);
   PetscFunctionReturn(0);
 }

@@ -242,7 +242,7 @@ PetscErrorCode runPrepared(Prepared &prepared, int argc, char **argv, const Opti
     *exit_code = 2;
   }
   recorder.close();
-  if (finished && o.model_check) PetscCall(proveModels(prepared, o, recorder.last().wall_seconds, progress, exit_code));
+  if (finished && o.model_check) PetscCall(proveModels(prepared, o, progress, exit_code));
   if (finished && o.error_estimate && o.loop.dynamic) tellTimeError(recorder.last(), o, progress);
   if (finished && o.error_estimate && !o.loop.dynamic)
     PetscCall(tellError(prepared, recorder.last().rounding_error, recorder.criticalFactors(), o, progress));

@@ -10,11 +10,10 @@
 namespace tendril {
 namespace {
 
-void tell(const State &state, const Options &o, Progress &progress) {
-  std::ostringstream line;
-  line << "model auto: after " << (o.loop.dynamic ? "time " : "load factor ") << state.time
-       << " planar rods lose their stability: they go on as full ones";
-  progress.say(line.str());
+std::string after(const State &state, const Options &o) {
+  std::ostringstream text;
+  text << "after " << (o.loop.dynamic ? "time " : "load factor ") << state.time << " planar rods lose their stability";
+  return text.str();
 }
 
 } // namespace
@@ -23,33 +22,43 @@ PetscErrorCode watchModels(Prepared &prepared, const Options &o, Progress &progr
   constexpr int seldom = 8;
   PetscFunctionBeginUser;
   Simulation &run = *prepared.run;
-  if (const int r = leftPlane(run.scene, run.state); r >= 0) {
+  for (int r; prepared.team.any((r = leftModel(run.scene, run.state)) >= 0);) {
+    if (prepared.team.size() > 1)
+      throw SceneError("a rod begins out of its plane or twisted, which its model leaves out; take -model full");
     const Rod &rod = run.scene.rods[std::size_t(r)];
+    const RodModel model = rod.model;
+    const std::string who = "rod '" + rod.name + "' ",
+                      why = model == RodModel::planar
+                                ? "begins out of its plane, moves out of it or is turned about its tangent"
+                                : "begins twisted";
     if (!rod.chooses_model)
-      throw SceneError("rod '" + rod.name +
-                       "' cannot be of model planar: it begins out of its plane, or moves out of "
-                       "it; take model full, or auto");
-    tell(run.state, o, progress);
-    PetscCall(leavePlanes(prepared, o));
+      throw SceneError(who + "cannot be of model " + nameOf(model) + ": it " + why + "; take model full, or auto");
+    progress.say("model auto: " + who + why + ": all that are " + nameOf(model) + " go on as full ones");
+    PetscCall(leaveModel(model, prepared, o));
   }
-  if (!hasChosenPlanes(run.scene)) PetscFunctionReturn(0);
+  if (!hasChosen(run.scene, RodModel::planar)) PetscFunctionReturn(0);
   auto watch = std::make_shared<PlaneWatch>();
   PetscCall(watch->setUp(run.scene, o.loop));
-  loop.widen = [&, watch](const State &next, bool unstable, bool *widened) {
+  loop.widen = [&, watch](const State &next, bool unstable, bool *widened, std::string *failure) {
     PetscFunctionBeginUser;
-    if (!hasChosenPlanes(run.scene) || (o.loop.dynamic && run.state.step % seldom != 0)) PetscFunctionReturn(0);
+    if (!hasChosen(run.scene, RodModel::planar) || (o.loop.dynamic && run.state.step % seldom != 0))
+      PetscFunctionReturn(0);
     *widened = unstable && !o.loop.dynamic; // its branch may lead anywhere
     if (!*widened) PetscCall(watch->check(next, widened));
     if (!*widened) PetscFunctionReturn(0);
-    tell(run.state, o, progress);
-    PetscCall(leavePlanes(prepared, o));
+    if (o.accuracy) {
+      *widened = false;
+      *failure = after(run.state, o) + ", and -accuracy has chosen the edges for these; take -model full";
+      PetscFunctionReturn(0);
+    }
+    progress.say("model auto: " + after(run.state, o) + ": they go on as full ones");
+    PetscCall(leaveModel(RodModel::planar, prepared, o));
     PetscFunctionReturn(0);
   };
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode proveModels(const Prepared &prepared, const Options &o, double seconds, Progress &progress,
-                           int *exit_code) {
+PetscErrorCode proveModels(const Prepared &prepared, const Options &o, Progress &progress, int *exit_code) {
   PetscFunctionBeginUser;
   const Simulation &run = prepared.whole();
   Scene scene = run.scene;
@@ -60,11 +69,7 @@ PetscErrorCode proveModels(const Prepared &prepared, const Options &o, double se
     progress.say("model check: no rod leaves anything out, there is nothing to prove");
     PetscFunctionReturn(0);
   }
-  for (Rod &rod : scene.rods) {
-    if (rod.model == RodModel::cable) rod.material.flexural_stiffness = rod.left_out;
-    rod.model = RodModel::full;
-    rod.flat = -1;
-  }
+  for (Rod &rod : scene.rods) giveAllUnknowns(rod);
   Simulation full;
   PetscCall(full.setUp(std::move(scene), o.loop));
   TimeLoop loop(full.solver, o.loop);
@@ -89,7 +94,7 @@ PetscErrorCode proveModels(const Prepared &prepared, const Options &o, double se
   std::ostringstream line;
   line << std::setprecision(3) << "model check: full rods end " << apart << " rod lengths away";
   if (apart <= most) {
-    line << ", and took " << end - begin << " s, this run " << seconds << " s";
+    line << ", and took " << end - begin << " s without output";
     progress.say(line.str());
     PetscFunctionReturn(0);
   }

@@ -11,7 +11,7 @@ namespace tendril {
 /// Whether a rod that bends runs through a junction without a frame.
 static bool runsThrough(const DofMap &dofs, const JoinedVertex &j) {
   const RodRange &rod = dofs.rods()[j.rod];
-  if (!rod.twist || j.vertex == 0 || j.vertex == rod.edges) return false;
+  if (!rod.bends || j.vertex == 0 || j.vertex == rod.edges) return false;
   const auto edges = dofs.joinedEdges({j.rod, j.rod + 1});
   return std::none_of(edges.begin(), edges.end(), [&](const JoinedEdge &e) { return e.vertex == j.vertex; });
 }
@@ -55,7 +55,7 @@ void CondensedFactor::cut() {
     if (!runsThrough(dofs_, j)) continue;
     edge_number[j.slot] = int(unknown_.size());
     unknown_.insert(unknown_.end(), 3, -1);
-    unknown_.push_back(int(dofs_.unknown(j.slot, 3) - first));
+    if (dofs_.rods()[j.rod].twist) unknown_.push_back(int(dofs_.unknown(j.slot, 3) - first));
   }
   auto places = [&](const JoinedVertex &j, const JoinedEdge *edge) {
     Places p;
@@ -66,7 +66,8 @@ void CondensedFactor::cut() {
       if (j.isOnBody()) p[state_size + a] = number.at(j.first_frame) + a;
     }
     if (const auto through = edge_number.find(j.slot); through != edge_number.end())
-      for (int c = 0; c < edge_size; ++c) p[edge_at + c] = through->second + c;
+      for (int c = 0; c < edge_size; ++c)
+        if (dofs_.rods()[j.rod].has(c)) p[edge_at + c] = through->second + c;
     return p;
   };
   for (int r = rods_.begin; r < rods_.end; ++r) {

@@ -71,6 +71,33 @@ def restarts():
         assert min(np.abs(x[:, 0]).max(), np.abs(x[:, 2]).max()) > 1e-4, "the rod has come back to a plane"
         told = run(folder, text, "-model", "planar", "-restart", "out", "-t_end", "0.3", code=1, output="no")
         assert "begins out of its plane" in told, told
+    # Twisted by a torque, let go and pulled aside: a strip that twists bends aside.
+    strip = text.replace("[0, -10, 0]", "[10, 0, 0]").replace("flexural_stiffness: [1, 1]", "flexural_stiffness: [1, 0.02]")
+    strip = strip.replace("linear_density: 1,", "linear_density: 1, linear_rotational_inertia: 0.03,")  # so that it takes its time
+    held = strip.replace("[10, 0, 0]", "[0, 0, 0]").replace("mode: dynamic, dt: 0.01, t_end: 0.2", "mode: static") + "loads: [{edge: last, torque: 1}]\n"
+    with tempfile.TemporaryDirectory() as folder:
+        run(folder, held, "-model", "full", output="twisted")
+        again = ("-restart", "twisted", "-restart_time", "0")
+        run(folder, strip, "-model", "full", *again, output="full")
+        full, _ = read(folder, "full")
+        told = run(folder, strip, "-model", "auto", *again, output="on")
+        assert "turned about its tangent" in told and "go on as full ones" in told, told
+        apart = np.abs(read(folder, "on")[0] - full).max()
+        assert np.abs(full[:, 2]).max() > 1e-3 and apart < 1e-9, (np.abs(full[:, 2]).max(), apart)
+        told = run(folder, strip, "-model", "planar", *again, output="no", code=1)
+        assert "turned about its tangent" in told, told
+        round_rod = text.replace("[0, -10, 0]", "[1, 0, 1]").replace("linear_density: 1,", "linear_density: 1, linear_rotational_inertia: 0,")
+        told = run(folder, round_rod, "-model", "torsion_free", *again, output="no", code=1)
+        assert "begins twisted" in told, told
+
+
+def accuracies():
+    """Edges that were chosen for planar rods are not those of rods that buckle: the run says so and ends."""
+    text = COLUMN.format(gravity="[0, 0, 0]", out=0.01, within=1) + "loads: [{vertex: last, force: [0.5, -0.01, 0]}]\n"
+    text = text.replace("torsional_stiffness: 1", "torsional_stiffness: 0.01")
+    with tempfile.TemporaryDirectory() as folder:
+        told = run(folder, text, "-model", "auto", "-accuracy", "1e-3", code=2)
+        assert "lose their stability" in told and "take -model full" in told, told
 
 
 def proofs():
@@ -101,6 +128,7 @@ def frequencies():
 
 buckling()
 restarts()
+accuracies()
 proofs()
 frequencies()
 print("models hold")

@@ -42,7 +42,10 @@ inline void draw(Net &net, Random &random, int rods, int nodes, bool frames) {
     const Vec3 begin = kind == 1 ? Vec3(3 * random.vector()) : places[from],
                end = kind == 2 ? Vec3(3 * random.vector()) : places[to];
     Rod rod = inextensibleRod(lineShape(begin, end, edges).points, Measure::angle);
-    if (random() > 0.8) rod.material.flexural_stiffness = {0, 0}, rod.material.torsional_stiffness = 0;
+    if (random() > 0.8)
+      rod.material.flexural_stiffness = {0, 0}, rod.material.torsional_stiffness = 0;
+    else if (!frames && random() > 0)
+      rod.model = RodModel::torsion_free;
     net.scene.rods.push_back(rod);
     auto join = [&](int node, int vertex) {
       Junction &j = net.scene.junctions[node];

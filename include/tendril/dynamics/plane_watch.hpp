@@ -21,11 +21,12 @@ private:
   Step step_;
 };
 
-/// The scene in which rods that chose to be planar have all unknowns.
-Scene freeOfPlanes(Scene scene);
-/// Whether a rod of the scene chose to be planar.
-bool hasChosenPlanes(const Scene &scene);
-/// The first planar rod of a scene whose state is out of its plane, or moves out of it; -1: none.
-int leftPlane(const Scene &scene, const State &state);
+/// The scene in which rods that chose a model have all unknowns.
+Scene freeOf(RodModel model, Scene scene);
+/// Whether a rod of the scene chose a model.
+bool hasChosen(const Scene &scene, RodModel model);
+/// The first rod of a scene that cannot have its state by its model: planar, and out of its plane, moving out of it, or
+/// turned about its tangent; without torsion, and twisted. -1: none.
+int leftModel(const Scene &scene, const State &state);
 
 } // namespace tendril

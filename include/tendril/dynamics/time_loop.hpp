@@ -64,8 +64,8 @@ public:
   std::function<PetscErrorCode(bool *stays)> unite;
   /// Asked with the state that a step would lead to, and whether it has met an unstable equilibrium, whether the scene
   /// must be modelled with more unknowns: the state and the solver are those of more unknowns then, and the step is
-  /// taken anew.
-  std::function<PetscErrorCode(const State &next, bool unstable, bool *widened)> widen;
+  /// taken anew; or why the run must not go on, as failure().
+  std::function<PetscErrorCode(const State &next, bool unstable, bool *widened, std::string *failure)> widen;
   std::function<bool()>
       stops; ///< asked in each step whether to end after it: `finished` is false then, and failure() is empty
   TimeLoop(StepSolver &solver, const LoopSettings &settings)

@@ -35,14 +35,27 @@ template <class T> CellOf<T> cellOf(const Planes &cells, const Configuration &c,
   return cell;
 }
 
+/// Frames and constants of a cell (or a pack of `count` cells) as its energy wants them. Of a rod in space whose twists
+/// are no unknowns the second director goes with the first: held ones may have turned ahead of those that follow at the
+/// end of a step. \param cells constants, as Elements::cells()
+template <class T>
+std::pair<std::array<FrameOf<T>, 2>, CellOf<T>> presentCell(const Elements &elements, const Planes &cells,
+                                                            const Configuration &c, int rod, const LooseCell &cell,
+                                                            int count = 1) {
+  std::array<FrameOf<T>, 2> f = cellFrames<T>(c, cell, count);
+  const RodRange &range = elements.rods[rod];
+  if (!range.isReduced() || range.flat >= 0) return {f, cellOf<T>(cells, c, cell.slot)};
+  f[1].director = transport<T>(f[0].director, f[0].tangent, f[1].tangent);
+  return {f, readCell<T>(cells, cell.slot)};
+}
+
 /// Present strains of a cell (or a pack of `count` cells), integrated over it [rad].
 template <class T>
 std::array<T, 3> presentStrain(const Elements &elements, const Configuration &configuration, int rod,
                                const LooseCell &cell, int count = 1) {
-  const auto [f0, f1] = cellFrames<T>(configuration, cell, count);
-  const CellOf<T> constants = cellOf<T>(elements.cells(), configuration, cell.slot);
-  return elements.measure[rod] == Measure::tan ? cellStrain<Measure::tan>(f0, f1, constants)
-                                               : cellStrain<Measure::angle>(f0, f1, constants);
+  const auto [f, constants] = presentCell<T>(elements, elements.cells(), configuration, rod, cell, count);
+  return elements.measure[rod] == Measure::tan ? cellStrain<Measure::tan>(f[0], f[1], constants)
+                                               : cellStrain<Measure::angle>(f[0], f[1], constants);
 }
 
 /// Strains of a configuration: a row over slots of the edges' axial ones, and three of the cells', each with room for a

@@ -40,8 +40,8 @@ void prepare(Prepared &prepared, Options &options);
 /// Has what may touch in the next step on one rank each (StepSolver::groups), with its state; a rank that has nothing
 /// then is no longer of the team. \param line what to tell of it
 PetscErrorCode unite(Prepared &prepared, const Options &options, std::string *line);
-/// Gives planar rods that chose to be so all their unknowns; the state stays.
-PetscErrorCode leavePlanes(Prepared &prepared, const Options &options);
+/// Gives rods that chose a model all their unknowns; the state stays.
+PetscErrorCode leaveModel(RodModel model, Prepared &prepared, const Options &options);
 /// Chooses the edges, and in dynamics the steps, and makes the scene ready to run with them.
 void meetAccuracy(Prepared &prepared, Options &options, Choice *choice);
 

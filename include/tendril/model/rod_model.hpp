@@ -19,18 +19,13 @@ enum class RodModel { cable, planar, torsion_free, full };
 inline constexpr const char *rod_model_names[] = {"cable", "planar", "torsion_free", "full"};
 inline const char *nameOf(RodModel model) { return rod_model_names[int(model)]; }
 
-/// Why a model would leave out what acts on a rod, or what it answers with, as the end of a sentence; empty where its
-/// answers are those of `full`. A planar rod stays in its plane until it buckles out of it.
-/// \param dynamic whether inertia counts
-std::string whyNot(const Scene &scene, int rod, RodModel model, bool dynamic);
-
-/// The coordinate in which all vertices of a rod agree, 0 to 2, of which most others are at rest; -1: none.
-int flatCoordinate(const Scene &scene, int rod);
-
 /// Gives every rod that asks for it the smallest model that is proven, refuses models that are not, and lays planar
-/// rods into their planes to the last bit. \param watched whether planar rods that chose to be so are watched
-/// (PlaneWatch); else none does \param notes what was chosen, and why \throws SceneError
+/// rods into their planes to the last bit. \param dynamic whether inertia counts \param watched whether planar rods
+/// that chose to be so are watched (PlaneWatch); else none does \param notes what was chosen, and why
+/// \throws SceneError
 void settleModels(Scene &scene, bool dynamic, bool watched, std::vector<std::string> *notes);
+/// Makes a rod a full one, with what its model left out.
+void giveAllUnknowns(Rod &rod);
 /// Lays a planar rod into its plane.
 void flatten(Rod &rod);
 

@@ -76,6 +76,7 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
       const int s = rod.slot(i), v = rod.first_vertex + i;
       if (elements.freedom()[s] != 0 && elements.mass()[s] > 0)
         a.vertex[v] = -force.vector(0, s) / elements.mass()[s] - damping * state.velocity[v];
+      if (rod.flat >= 0) a.vertex[v][rod.flat] = 0; // rounding, which would grow
     }
     for (int i = 0; rod.twist && i < rod.edges; ++i) {
       const int s = rod.slot(i), e = rod.first_edge + i;
