@@ -351,7 +351,8 @@ PetscErrorCode NewtonSolver::settleMinimum(Seek seek, Outcome *now) {
     PetscCall(inertiaAtIterate(&negative));
     report_.negative_pivots = negative;
     if (k == 0) report_.first_negative_pivots = negative;
-    if (seek == Seek::equilibrium && negative >= 0) break;
+    // Where nothing holds a scene that is at rest, its Hessian may be too singular to be factored.
+    if (seek == Seek::equilibrium && (negative >= 0 || report_.iterations == 0)) break;
     if (negative > 0)
       now->beyond = limitOfLaw(*potential_, rods_, potential_->iterate(), 1, std::sqrt(2.0 / 3),
                                std::sqrt(1.0 / 3)); // where an edge gives way, the load falls
