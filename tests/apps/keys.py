@@ -224,7 +224,7 @@ def examples():
         if option:
             name = path if path.startswith("-") else "-rod_" + path.rpartition(".")[2]
             words = [] if path == "-scene" else [name, key["example"].replace("[", "").replace("]", "").replace(", ", ",")]
-            words += ["-mode", "modes"] if path == "-modes" else []
+            words += {"-modes": ["-mode", "modes"], "-buckling_to": ["-mode", "buckling"]}.get(path, [])
             other = ("contact.friction", 0.1) if path.startswith("-contact") else ("rods[].gravity", True)
             runs.append((exampleScene(*(other if path.startswith("-") else (path, value))), words))
         for scene, words in runs:
