@@ -157,6 +157,7 @@ PetscErrorCode BucklingPath::begin(State &state, Point *at) {
   rest.state = state;
   for (int more = 8;; more *= 4) { // motions that cost nothing, or are unstable from no load on
     asked_ = std::min(all, count_ + more);
+    free_ = -1;
     PetscCall(reach(rest, early * settings_.dt, at));
     if (!at->found || at->unstable + free_ + 2 <= more || asked_ == all) break;
   }

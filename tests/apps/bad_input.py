@@ -852,7 +852,7 @@ rows = [
     ("more buckling modes than motions", None, ["-mode", "buckling", "-modes", "99"], ["option -modes: 99", "motions"]),
     ("buckling modes with time steps", None, ["-mode", "buckling", "-dt", "0.1"], ["option -dt", "-mode buckling"]),
     ("buckling modes to a time", None, ["-mode", "buckling", "-t_end", "2"], ["option -t_end", "use -buckling_to"]),
-    ("buckling modes to nothing", None, ["-mode", "buckling", "-buckling_to", "0"], ["option -buckling_to", "larger than 0"]),
+    ("buckling modes to nothing", None, ["-mode", "buckling", "-buckling_to", "0"], ["option -buckling_to", "greater than zero"]),
     ("buckling modes in adapted steps", None, ["-mode", "buckling", "-dt_adapt", "error"], ["option -dt_adapt", "-mode buckling"]),
     ("buckling modes along arc length", None, ["-mode", "buckling", "-continuation", "arclength"], ["option -continuation", "-mode buckling"]),
     ("buckling modes with a bifurcation", None, ["-mode", "buckling", "-bifurcation", "switch"], ["option -bifurcation", "-mode buckling"]),

@@ -263,6 +263,32 @@ loads:
   EXPECT_NEAR(factorsOf(make(8), 1)[0], own, 1e-7 * own);
 }
 
+/// Of a flat grid on pins, joined by scissors, each rod turns about itself at no cost: more motions than modes.
+TEST(BucklingModes, OfAGridWhoseRodsTurnFreely) {
+  const Folder folder;
+  const Scene scene = readScene(folder.write("grid.yaml", R"(gravity: [0, 0, 0]
+rods:
+  - name: x
+    line: {from: [-0.125, 0, 0], to: [0.875, 0, 0], edges: 16}
+    copies: {count: 4, offset: [0, 0.25, 0]}
+    material: &material {radius: 3.0e-3, young: 4.0e+10, poisson: 0.3, density: 2000}
+  - {name: y, line: {from: [0, -0.125, 0], to: [0, 0.875, 0], edges: 16}, copies: {count: 4, offset: [0.25, 0, 0]},
+     material: *material}
+supports:
+  - {rod: x, vertex: 0, type: pin}
+  - {rod: y, vertex: 0, type: pin}
+  - {rod: x, vertex: last, type: pin, motion: {velocity: [-3.0e-5, 0, 0]}}
+  - {rod: y, vertex: last, type: pin, motion: {velocity: [0, -3.0e-5, 0]}}
+junctions:
+  - {type: scissor, shared: true}
+)"))
+                          .scene;
+  const std::vector<double> found = factorsOf(scene, 3);
+  const double exact = bisected(scene, 4);
+  EXPECT_NEAR(found[0], exact, 1e-7 * exact);
+  EXPECT_NEAR(found[2], found[1], 1e-5 * found[1]); // alike but for the order of the rods at their joints
+}
+
 /// A model with fewer unknowns has the loads that its motions have in the full one.
 TEST(BucklingModes, OfModelsAreThoseOfTheirMotions) {
   Scene full = standing(20, 1, 0);
