@@ -234,7 +234,8 @@ def examples():
                 with open(f"{folder}/{PART}", "w") as f:
                     f.write(PART_TEXT)
                 run = subprocess.run([program, "-scene", "s.yaml", *words], cwd=folder, capture_output=True, text=True)
-                assert run.returncode == 0, f"{path}: {key['example']}: exit code {run.returncode}\n{run.stderr}\n{yaml.safe_dump(scene)} {words}"
+                none = path == "-buckling_to" and "0 of 6 modes found" in run.stderr  # the scene does not buckle
+                assert run.returncode == 0 or none, f"{path}: {key['example']}: exit code {run.returncode}\n{run.stderr}\n{yaml.safe_dump(scene)} {words}"
                 count += 1
     assert count > 90, f"only {count} examples were run"
 
