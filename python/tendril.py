@@ -358,14 +358,18 @@ class Joint:
 
 @dataclass(frozen=True)
 class Modes:
-    """Small motions about the last frame, n from the lowest on: it moves by shape times cos(frequency t), or in one
-    that grows by shape times exp(growth_rate t). Their kinetic energy is that of 1 kg m^2: the shapes are orthonormal by the
-    masses.
+    """Modes, n from the lowest on. Of a run with -mode modes small motions about the last frame: it moves by shape times
+    cos(frequency t), or in one that grows by shape times exp(growth_rate t). Their kinetic energy is that of 1 kg m^2:
+    the shapes are orthonormal by the masses.
 
     frequency (n,) [rad/s], 0 of motions that cost nothing and of those that grow; growth_rate (n,) [1/s], 0 where the
     equilibrium is stable; eigenvalue (n,) [1/s^2], their squares, negative of those that grow;
     shape (n, vertices, 3) [m]; twist (n, edges) [rad], of edges about their tangents, parallel transport taken off;
     body_shape (n, bodies, 3) [m] of the origins of bodies, body_rotation (n, bodies, 3) [rad], rotation vectors.
+
+    Of a run with -mode buckling the motions that lose their stiffness at load_factor (n,), about the frame nearest to
+    it in time: their largest displacement is 1 m, or where nothing is displaced their largest twist 1 rad. What belongs
+    to the other kind of run is None.
     """
 
     frequency: np.ndarray
@@ -375,6 +379,7 @@ class Modes:
     twist: np.ndarray
     body_shape: np.ndarray
     body_rotation: np.ndarray
+    load_factor: np.ndarray
 
 
 class Things(list):
@@ -792,12 +797,13 @@ class Trajectory:
 
     @property
     def modes(self):
-        """The Modes of a run with -mode modes; None until it has ended, and of others."""
+        """The Modes of a run with -mode modes or buckling; None until it has ended, and of others."""
         if "modes" not in self._file:
             return None
         group = self._file["modes"]
-        none = np.zeros((len(group["frequency"]), 0, 3))
-        return Modes(*(group[name][:] if name in group else none for name in Modes.__dataclass_fields__))
+        none = np.zeros((len(group["shape"]), 0, 3))
+        return Modes(*(group[name][:] if name in group else none if name.startswith("body") else None
+                       for name in Modes.__dataclass_fields__))
 
     @property
     def estimate(self):

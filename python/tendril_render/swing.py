@@ -1,4 +1,4 @@
-"""A vibration about an equilibrium as frames to draw."""
+"""A mode about an equilibrium as frames to draw."""
 import numpy as np
 from tendril import edge_frames
 
@@ -15,7 +15,8 @@ def turned(vectors, axes, angles):
 
 
 class Swing:
-    """A trajectory whose frames are a mode about its last one, with the deflections in `time`; the rest is as there."""
+    """A trajectory whose frames are a mode about its last one, a buckling mode about that at its load, with the
+    deflections in `time`; the rest is as there."""
 
     time_name = "deflection"
 
@@ -23,16 +24,22 @@ class Swing:
         """number: of the mode, from 1; share: the largest displacement over the size of all."""
         modes = t.modes
         if modes is None:
-            raise Mistake("--mode: this run has no modes; run it with -mode modes")
-        if not 1 <= number <= len(modes.frequency):
-            raise Mistake(f"--mode {number}: the run has modes 1 to {len(modes.frequency)}")
-        k = number - 1
-        rate = modes.growth_rate[k]
-        self.words = f"mode {number}: " + (f"grows by {rate:.4g}/s" if rate > 0 else f"{modes.frequency[k]:.4g} rad/s")
+            raise Mistake("--mode: this run has no modes; run it with -mode modes or -mode buckling")
+        if not 1 <= number <= len(modes.shape):
+            raise Mistake(f"--mode {number}: the run has modes 1 to {len(modes.shape)}")
+        k, self._at = number - 1, -1
+        if modes.load_factor is not None:
+            self._at = int(np.argmin(np.abs(t.time - modes.load_factor[k])))
+            what = f"load factor {modes.load_factor[k]:.6g}"
+        elif modes.growth_rate[k] > 0:
+            what = f"grows by {modes.growth_rate[k]:.4g}/s"
+        else:
+            what = f"{modes.frequency[k]:.4g} rad/s"
+        self.words = f"mode {number}: {what}"
         self._t, self.time = t, np.asarray(deflections, float)
         moved = [np.linalg.norm(v, axis=-1).max(initial=0) for v in (modes.shape[k], modes.body_shape[k])]
         spun = [np.abs(modes.twist[k]).max(initial=0), np.linalg.norm(modes.body_rotation[k], axis=-1).max(initial=0)]
-        size = np.linalg.norm(np.ptp(t.field("position")[-1], axis=0))
+        size = np.linalg.norm(np.ptp(t.field("position")[self._at], axis=0))
         only_turns = max(moved) < 1e-6 * size * max(spun)
         scale = TURN / max(spun) if only_turns else share * size / max(moved)
         self._shape, self._twist = scale * modes.shape[k], scale * modes.twist[k]
@@ -44,7 +51,7 @@ class Swing:
         return getattr(self._t, name)
 
     def _rod(self, rod):
-        x, d = rod.position(), rod.director()
+        at, x, d = self._at, rod.position(self._at), rod.director(self._at)
         shape = self._shape[rod.first_vertex : rod.first_vertex + rod.vertices]
         twist = self._twist[rod.first_edge : rod.first_edge + rod.edges]
         before, field = edge_frames(x, d)[2], rod.field
@@ -58,11 +65,11 @@ class Swing:
 
         rod.position = lambda frame=-1: x + self.time[frame] * shape
         rod.director = director
-        rod.field = lambda name, frame=-1: field(name)
+        rod.field = lambda name, frame=-1: field(name, at)
         return rod
 
     def _body(self, body):
-        (x, q), k = body.pose(), body.index
+        (x, q), k = body.pose(self._at), body.index
 
         def pose(frame=-1):
             spin = self.time[frame] * self._body_rotation[k]

@@ -39,8 +39,9 @@ PetscErrorCode startSlepc() {
 class IslandModes {
 public:
   /// \param work right-hand sides and solutions of the block, which its islands share
-  IslandModes(NewtonSolver &block, const IncrementalPotential &potential, RodSet island, std::array<Planes, 2> &work)
-      : block_(block), potential_(potential), island_(island), right_(work[0]), solution_(work[1]) {}
+  IslandModes(NewtonSolver &block, const IncrementalPotential &potential, RodSet island, Metric metric,
+              std::array<Planes, 2> &work)
+      : block_(block), potential_(potential), island_(island), metric_(metric), right_(work[0]), solution_(work[1]) {}
 
   PetscErrorCode find(int count, std::string *failure);
   /// From the lowest on.
@@ -49,7 +50,7 @@ public:
   double zero() const; ///< \see Modes
 
   // What SLEPc calls.
-  PetscErrorCode applyMass(Vec x, Vec y);
+  PetscErrorCode applyMetric(Vec x, Vec y);
   PetscErrorCode applyInverse(Vec x, Vec y);
 
 private:
@@ -60,21 +61,22 @@ private:
   NewtonSolver &block_;
   const IncrementalPotential &potential_;
   RodSet island_;
+  Metric metric_;
   Planes &right_, &solution_;
   double shift_ = 0; ///< s = -shift_, below all eigenvalues [1/s^2]
   std::vector<Mode> found_;
 
-  PetscErrorCode countBelow(double value, int *count) { return block_.factorWithMass(island_, -value, count); }
+  PetscErrorCode countBelow(double value, int *count) { return block_.factorWith(metric_, island_, -value, count); }
   PetscErrorCode chooseShift(int count);
   PetscErrorCode search(int count);
   PetscErrorCode isComplete(int count, int *missing);
 };
 
-PetscErrorCode massCallback(Mat m, Vec x, Vec y) {
+PetscErrorCode metricCallback(Mat m, Vec x, Vec y) {
   IslandModes *modes;
   PetscFunctionBeginUser;
   PetscCall(MatShellGetContext(m, &modes));
-  PetscCall(modes->applyMass(x, y));
+  PetscCall(modes->applyMetric(x, y));
   PetscFunctionReturn(0);
 }
 
@@ -90,10 +92,10 @@ PetscErrorCode inverseCallback(PC pc, Vec x, Vec y) {
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode IslandModes::applyMass(Vec x, Vec y) {
+PetscErrorCode IslandModes::applyMetric(Vec x, Vec y) {
   PetscFunctionBeginUser;
   PetscCall(potential_.dofs().scatter(x, island_, solution_));
-  multiplyMass(potential_, island_, solution_, right_);
+  block_.multiplyMetric(metric_, island_, solution_, right_);
   PetscCall(potential_.dofs().gather(right_, island_, y));
   PetscFunctionReturn(0);
 }
@@ -146,7 +148,7 @@ PetscErrorCode IslandModes::search(int count) {
   const PetscInt n = potential_.dofs().unknowns(island_);
   PetscCall(countBelow(-shift_, &negative)); // its factor is what applyInverse solves with
   for (OwnedMat *m : {&stiffness, &mass}) PetscCall(MatCreateShell(PETSC_COMM_SELF, n, n, n, n, this, m->out()));
-  PetscCall(MatShellSetOperation(mass, MATOP_MULT, (void (*)(void))massCallback));
+  PetscCall(MatShellSetOperation(mass, MATOP_MULT, (void (*)(void))metricCallback));
   PetscCall(MatShellSetOperation(stiffness, MATOP_MULT, (void (*)(void))stiffnessCallback));
   PetscCall(EPSCreate(PETSC_COMM_SELF, eps.out()));
   PetscCall(EPSSetOperators(eps, stiffness, mass));
@@ -188,8 +190,9 @@ PetscErrorCode IslandModes::isComplete(int count, int *missing) {
   *missing = std::max(0, count - int(found_.size()));
   if (*missing > 0) PetscFunctionReturn(0);
   const double last = found_[std::size_t(count) - 1].eigenvalue;
-  for (const double gap : {1e-8, 1e-7, 1e-6}) { // beside an eigenvalue the count is rounding
-    const double above = last + gap * (last + shift_);
+  const bool is_free = std::abs(last) <= zero(); // it may be one of many, told apart by rounding
+  for (const double gap : {1e-8, 1e-7, 1e-6}) {  // beside an eigenvalue the count is rounding
+    const double above = is_free ? 1e8 * gap * zero() : last + gap * (last + shift_);
     int below;
     PetscCall(countBelow(above, &below));
     const auto known = std::count_if(found_.begin(), found_.end(), [&](const Mode &m) { return m.eigenvalue < above; });
@@ -203,7 +206,7 @@ PetscErrorCode IslandModes::isComplete(int count, int *missing) {
 PetscErrorCode IslandModes::find(int count, std::string *failure) {
   constexpr int most_rounds = 8;
   PetscFunctionBeginUser;
-  const int rank = massRank(potential_, island_);
+  const int rank = metric_ == Metric::mass ? massRank(potential_, island_) : int(potential_.dofs().unknowns(island_));
   count = std::min(count, rank);
   if (count == 0) PetscFunctionReturn(0);
   PetscCall(chooseShift(count));
@@ -241,7 +244,7 @@ PetscErrorCode IslandModes::shape(int k, Rates *out) {
   const Elements &e = potential_.elements();
   PetscFunctionBeginUser;
   PetscCall(potential_.dofs().scatter(found_[std::size_t(k)].vector, island_, solution_));
-  multiplyMass(potential_, island_, solution_, right_);
+  block_.multiplyMetric(metric_, island_, solution_, right_);
   out->vertex.assign(std::size_t(e.vertices()), Vec3::Zero());
   out->edge.assign(std::size_t(e.edges()), 0.0);
   out->body.assign(std::size_t(e.bodyCount()), BodyRate());
@@ -274,19 +277,9 @@ PetscErrorCode IslandModes::shape(int k, Rates *out) {
 
 } // namespace
 
-PetscErrorCode findModes(StepSolver &solver, const State &state, Step step, int count, Modes *modes,
-                         std::string *failure) {
+PetscErrorCode modesAtIterate(StepSolver &solver, Metric metric, int count, Modes *modes, std::string *failure) {
   PetscFunctionBeginUser;
   PetscCall(startSlepc());
-  const Doing here([](std::ostream &out) { out << "natural frequencies are found"; });
-  step.time = step.load_factor = state.time;
-  step.small_motions = true;
-  NewtonReport report;
-  {
-    const SharpTolerance sharp(solver);
-    PetscCall(solver.solve(state, step, &report, Seek::equilibrium));
-  }
-  if (!report.converged) PetscCall(solver.begin(state, step)); // rounding leaves no better one
   *modes = {};
   std::vector<IslandModes> islands;
   struct Place {
@@ -301,7 +294,7 @@ PetscErrorCode findModes(StepSolver &solver, const State &state, Step step, int 
     planes.setOrigin(solver.potential().elements().rods[std::size_t(block.rods().begin)].first_slot);
     work.push_back({planes, planes});
     for (const RodSet island : block.islands()) {
-      IslandModes &one = islands.emplace_back(block, solver.potential(), island, work.back());
+      IslandModes &one = islands.emplace_back(block, solver.potential(), island, metric, work.back());
       PetscCall(one.find(count, failure));
       if (!failure->empty()) PetscFunctionReturn(0);
       const std::vector<double> values = one.eigenvalues();
@@ -315,6 +308,22 @@ PetscErrorCode findModes(StepSolver &solver, const State &state, Step step, int 
     modes->eigenvalue.push_back(p.eigenvalue);
     PetscCall(islands[p.island].shape(p.number, &modes->shape.emplace_back()));
   }
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode findModes(StepSolver &solver, const State &state, Step step, int count, Modes *modes,
+                         std::string *failure) {
+  PetscFunctionBeginUser;
+  const Doing here([](std::ostream &out) { out << "natural frequencies are found"; });
+  step.time = step.load_factor = state.time;
+  step.small_motions = true;
+  NewtonReport report;
+  {
+    const SharpTolerance sharp(solver);
+    PetscCall(solver.solve(state, step, &report, Seek::equilibrium));
+  }
+  if (!report.converged) PetscCall(solver.begin(state, step)); // rounding leaves no better one
+  PetscCall(modesAtIterate(solver, Metric::mass, count, modes, failure));
   PetscFunctionReturn(0);
 }
 

@@ -156,7 +156,7 @@ void checkScene(const Scene &scene, const Options &o, std::vector<std::string> *
     throw SceneError("option -model_check: runs the scene again from its start, in steps of time or load; take "
                      "-restart and -continuation arclength away");
   if (o.modes > 0) checkModes(scene, o);
-  if (!o.loop.dynamic && !(o.modes > 0 && isAlone(scene))) requireHeld(scene);
+  if (!o.loop.dynamic && !(o.modes > 0 && !o.buckling && isAlone(scene))) requireHeld(scene);
   if (o.loop.dynamic && !scene.rotation.angular_velocity.isZero(0))
     throw SceneError("scene key 'rotation': is for -mode static, a scene at rest in a frame that turns; in dynamics "
                      "let supports turn by their motion");

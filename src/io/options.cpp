@@ -218,6 +218,7 @@ void readTime(Texts &texts, Options *o) {
 void readStatics(Texts &texts, Options *o) {
   o->modes_given = texts.has("-modes");
   o->modes = texts.integer("-modes");
+  if (texts.has("-buckling_to")) o->buckling_to = texts.number("-buckling_to");
   if (texts.has("-load_steps")) o->given_load_steps = texts.integer("-load_steps");
   if (texts.has("-arclength_steps")) o->arclength_steps = texts.integer("-arclength_steps");
   o->loop.arclength_steps = texts.integer("-arclength_steps");
@@ -304,57 +305,6 @@ PetscErrorCode readOptions(int argc, char **argv, Options *o) {
   texts.number("-snes_rtol"); // PETSc reads them, with less to say about mistakes
   texts.integer("-snes_max_it");
   PetscFunctionReturn(0);
-}
-
-namespace {
-void checkAccuracy(const Options &o) {
-  if (o.accuracy_of && !o.accuracy) fail("accuracy_of", "needs -accuracy, e.g. -accuracy 1e-3");
-  if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength && (o.accuracy || o.error_estimate))
-    fail(o.accuracy ? "accuracy" : "error_estimate",
-         "needs -continuation load: paths of two resolutions have no states in common");
-  if (o.accuracy && o.loop.bifurcation == Bifurcation::stop)
-    fail("accuracy", "is that of the answer at full load; -bifurcation stop ends before");
-  if (o.accuracy && !o.rod_edges.empty())
-    fail("rod_edges", "gives the edges that -accuracy chooses; take one of the two away");
-  if (o.accuracy && !o.restart.empty())
-    fail("accuracy", "chooses the edges, which a checkpoint already has; take -restart or -accuracy away");
-}
-
-} // namespace
-
-void resolve(const RunSettings &scene, Options &o) {
-  const std::string mode = o.mode.value_or(scene.mode), no_meaning = "has no meaning in -mode " + mode;
-  o.loop.dynamic = mode == "dynamic";
-  if (mode != "modes" && o.modes_given) fail("modes", no_meaning + "; use -mode modes");
-  if (mode != "modes") o.modes = 0;
-  o.load_steps = o.given_load_steps.value_or(scene.load_steps);
-  if (o.loop.dynamic) {
-    if (o.given_load_steps) fail("load_steps", "has no meaning in -mode dynamic; use -dt");
-    if (o.continuation || o.bifurcation || o.arclength_steps)
-      fail(o.continuation  ? "continuation"
-           : o.bifurcation ? "bifurcation"
-                           : "arclength_steps",
-           "has no meaning in -mode dynamic; use -mode static");
-    o.loop.dt = o.dt.value_or(scene.dt);
-    o.loop.t_end = o.t_end.value_or(scene.t_end);
-    if (o.loop.t_end / o.loop.dt > 1e12)
-      fail("dt", "a step of " + shortText(o.loop.dt) + " s never reaches the end at " + shortText(o.loop.t_end) +
-                     " s; write a larger dt or a smaller t_end");
-  } else {
-    if (o.dt) fail("dt", no_meaning + "; use -load_steps");
-    if (o.t_end) fail("t_end", no_meaning + "; the load factor ends at 1");
-    if (!o.dynamic_only.empty()) fail(o.dynamic_only, no_meaning);
-    o.loop.t_end = 1;
-    o.loop.dt = 1.0 / o.load_steps;
-    const bool arclength = o.loop.continuation == Continuation::arclength;
-    if (o.arclength_steps && !arclength) fail("arclength_steps", "needs -continuation arclength");
-  }
-  if (o.restart_time && o.restart.empty()) fail("restart_time", "needs -restart");
-  if (o.restart_time && !o.loop.dynamic) fail("restart_time", no_meaning + ", where time is the load factor");
-  checkAccuracy(o);
-  if (o.loop.dt_min > o.loop.dt) fail("dt_min", "must not be larger than the step " + shortText(o.loop.dt));
-  if (o.loop.dt_max > 0 && o.loop.dt_min > o.loop.dt_max)
-    fail("dt_min", "must not be larger than -dt_max " + shortText(o.loop.dt_max));
 }
 
 std::vector<int> edgesAsked(const Scene &scene, const Options &o) {

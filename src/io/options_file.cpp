@@ -45,8 +45,12 @@ private:
   }
 
   void putTime() {
-    put("mode", o.modes > 0 ? "modes" : o.loop.dynamic ? "dynamic" : "static");
+    put("mode", o.buckling ? "buckling" : o.modes > 0 ? "modes" : o.loop.dynamic ? "dynamic" : "static");
     if (o.modes > 0) put("modes", o.modes);
+    if (o.buckling) {
+      put("buckling_to", o.loop.t_end);
+      return put("load_steps", o.load_steps);
+    }
     if (o.loop.dynamic) {
       put("dt", o.loop.dt);
       put("t_end", o.loop.t_end);

@@ -111,7 +111,9 @@ PetscErrorCode march(Prepared &prepared, TimeLoop &loop, const Options &o, const
   auto critical = [&](const CriticalPoint &point) { return recorder.noteCritical(point); };
   auto stops = [&] { return request.asked(); };
   PetscCall(PetscLogStagePush(events().run));
-  if (o.modes > 0 && isAlone(run.scene)) {
+  if (o.buckling) {
+    PetscCall(followBuckling(prepared, o, observe, critical, stops, finished, failure));
+  } else if (o.modes > 0 && isAlone(run.scene)) {
     PetscCall(settleAlone(run, o, observe, finished, failure));
   } else if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength) {
     ArcLength path(run.solver, o.loop);
@@ -150,7 +152,7 @@ void tellStop(const State &state, const Options &o, int exit_code, const std::st
   std::ostringstream line;
   line << "stopped by " << StopRequest::reason(exit_code) << " at " << (o.loop.dynamic ? "time " : "load factor ")
        << state.time << " of " << o.loop.t_end;
-  if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength)
+  if (o.buckling || (!o.loop.dynamic && o.loop.continuation == Continuation::arclength))
     line << "; a path of equilibria cannot be gone on with";
   else
     line << "; go on with: " << command_line << (o.restart == "auto" ? "" : " -restart auto");
@@ -246,7 +248,7 @@ PetscErrorCode runPrepared(Prepared &prepared, int argc, char **argv, const Opti
   if (finished && o.error_estimate && o.loop.dynamic) tellTimeError(recorder.last(), o, progress);
   if (finished && o.error_estimate && !o.loop.dynamic)
     PetscCall(tellError(prepared, recorder.last().rounding_error, recorder.criticalFactors(), o, progress));
-  if (finished && o.modes > 0) PetscCall(tellModes(run, o, progress, exit_code));
+  if (finished && o.modes > 0) PetscCall(tellModes(prepared, o, progress, exit_code));
   PetscFunctionReturn(0);
 }
 
@@ -268,7 +270,7 @@ PetscErrorCode execute(int argc, char **argv, const OptionFiles &files, StopRequ
   if (!prepared.team.isEmpty()) PetscCall(findUnused(prepared.team, prepared.run->scene.touchesMoving(), &unknown));
   world.together([&] {
     if (!unknown.empty()) refuseUnused(unknown);
-    if (o.modes > 0) refuseTooManyModes(*prepared.run, o.modes);
+    if (o.modes > 0) refuseTooManyModes(*prepared.run, o);
     if (!world.leads()) return;
     begun.folder.emplace(o.output_dir);
     std::vector<std::string> inputs = files.files();

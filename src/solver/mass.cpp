@@ -64,18 +64,31 @@ int massRank(const IncrementalPotential &potential, RodSet islands) {
   return rank;
 }
 
-PetscErrorCode NewtonSolver::factorWithMass(RodSet island, double factor, int *negative) {
+void NewtonSolver::multiplyMetric(Metric metric, RodSet island, const Planes &x, Planes &y) const {
+  if (metric == Metric::mass) return multiplyMass(*potential_, island, x, y);
+  const DofMap &dofs = potential_->dofs();
+  for (int r = island.begin; r < island.end; ++r) {
+    const RodRange &rod = dofs.rods()[r];
+    for (int a = 0; a < slot_size; ++a) std::fill(y[a] + rod.first_slot, y[a] + rod.vertexEnd() + 2, 0.0);
+    dofs.forBeside({r, r + 1}, [&](int s) { y.setVector(0, s, Vec3::Zero()); });
+    addMetric(work_->metric, system_.edge_metric, rod, dofs.joins(r), 1, x, y);
+    dofs.fold(rod, y);
+  }
+  dofs.foldJoined(island, y);
+}
+
+PetscErrorCode NewtonSolver::factorWith(Metric metric, RodSet island, double factor, int *negative) {
   bool regular;
   PetscFunctionBeginUser;
   watch().beat();
   focus();
   fill(work_->active, false);
   fill(work_->active, island, true);
-  fill(work_->shift, 0.0);
+  fill(work_->shift, metric == Metric::shift ? factor : 0.0);
   potential_->assemble(island, HessianKind::exact);
   PetscCall(makeMatrix());
   EdgeBlocks blocks = potential_->blocks();
-  addMass(*potential_, island, factor, blocks);
+  if (metric == Metric::mass) addMass(*potential_, island, factor, blocks);
   system_.blocks = &blocks;
   PetscCall(refactor());
   system_.blocks = &potential_->blocks();

@@ -28,6 +28,10 @@ struct Modes {
 /// Number of motions that have a frequency.
 int massRank(const IncrementalPotential &potential);
 
+/// The lowest eigenvalues of the Hessian at the iterate by a metric, and their motions, with phi' (metric) phi = 1.
+/// \param count of modes, at most the rank of the metric \param failure empty, or why not all could be told apart
+PetscErrorCode modesAtIterate(StepSolver &solver, Metric metric, int count, Modes *modes, std::string *failure);
+
 /// Finds the lowest modes about an equilibrium, whose forces are balanced once more first as well as rounding allows.
 /// \param count of modes, at most massRank \param step settings of a static step; its load and time are those of the
 /// state \param failure empty, or why not all could be told apart

@@ -17,6 +17,9 @@ inline constexpr std::array<std::string_view, 4> bifurcations{"off", "locate", "
 /// Words of -partition, in the order of PartitionKind.
 inline constexpr std::array<std::string_view, 3> partitions{"auto", "contiguous", "metis"};
 
+/// Load factor up to which critical ones are looked for, unless told.
+constexpr double furthest_buckling = 100;
+
 /// What is in force in a run: the command line over the scene's `simulation` block.
 struct Options {
   std::string scene; ///< empty when not given
@@ -32,7 +35,9 @@ struct Options {
   PartitionKind partition = PartitionKind::automatic;
   int load_steps = 1;
   bool modes_given = false;
-  int modes = 0; ///< natural frequencies to find about the equilibrium; 0 in other modes
+  int modes = 0; ///< natural frequencies, or buckling modes, to find; 0 in other modes
+  bool buckling = false;
+  std::optional<double> buckling_to; ///< as given
   std::optional<Vec3> gravity;
   std::vector<std::pair<std::string, int>> rod_edges; ///< by names of rods, in order of the command line
   std::string output_dir = "out";

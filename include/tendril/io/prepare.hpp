@@ -8,6 +8,8 @@
 
 namespace tendril {
 
+class BucklingPath;
+
 /// A scene ready to run, on this rank its part of it; and as written, when it may have to be drawn again.
 struct Prepared {
   Team team;                             ///< of the ranks that have rods; empty on others
@@ -17,6 +19,7 @@ struct Prepared {
   SceneSource source;
   std::vector<std::string> notes, ranks; ///< to be told: of the scene; of how it is dealt out
   std::shared_ptr<const Scene> all; ///< on every rank, where what different ranks have may come to touch; else null
+  std::shared_ptr<BucklingPath> buckling; ///< that has been followed; else null
   Scene written;
   std::vector<Drawing> drawings;
 

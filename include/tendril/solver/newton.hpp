@@ -62,6 +62,10 @@ constexpr double regular_lift = 1e-7;
 /// saddle, or to list all critical loads.
 constexpr int most_searched_edges = 20000;
 
+/// What eigenvalues of the Hessian are taken by: the mass matrix (mass.hpp), which may be singular; or what indefinite
+/// Hessians are shifted by (BandedSystem), which is definite.
+enum class Metric { mass, shift };
+
 /// Where Newton begins instead of at the start of a step.
 struct Guess {
   Planes unknowns;    ///< displacements and spins since the start
@@ -132,10 +136,12 @@ public:
   PetscErrorCode criticalMode(int stable, double *lift, Planes *mode);
   /// Rods that nothing joins to others.
   const std::vector<RodSet> &islands() const { return islands_; }
-  /// Factors the Hessian at the iterate plus a multiple of the mass matrix (mass.hpp) of one island, in place of all:
-  /// solveLinear gives other rods zero. \param factor of the masses [1/s^2] \param negative receives the number of
-  /// eigenvalues of the pair below -factor, -1 where one is there to rounding, or the matrix cannot be factored
-  PetscErrorCode factorWithMass(RodSet island, double factor, int *negative);
+  /// Factors the Hessian at the iterate plus a multiple of the metric of one island, in place of all: solveLinear gives
+  /// other rods zero. \param factor of the metric [1/s^2] \param negative receives the number of eigenvalues of the
+  /// pair below -factor, -1 where one is there to rounding, or the matrix cannot be factored
+  PetscErrorCode factorWith(Metric metric, RodSet island, double factor, int *negative);
+  /// y = metric x of an island. \param x with copies, as DofMap::scatter leaves it
+  void multiplyMetric(Metric metric, RodSet island, const Planes &x, Planes &y) const;
   /// The square of about the frequency of the slowest bending wave of an island's rods [1/s^2].
   double slowestBending(RodSet island) const { return firstShift(island); }
   /// Solves with the matrix factored last.

@@ -1,0 +1,228 @@
+#include "tendril/dynamics/buckling.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace tendril {
+namespace {
+
+constexpr double early = 1e-3; // of the first step: where the path begins, for without loads a rod may be anywhere
+
+/// Makes the largest displacement, or where nothing is displaced the largest twist, one; of both signs that with a
+/// positive largest component.
+void scaleToOne(Rates &shape, double length) {
+  double moved = 0, twisted = 0, component = 0, twist = 0;
+  auto note = [](double d, double &largest) {
+    if (std::abs(d) > std::abs(largest) * (1 + 1e-6)) largest = d;
+  };
+  auto displaced = [&](const Vec3 &v) {
+    moved = std::max(moved, v.norm());
+    for (const double d : v) note(d, component);
+  };
+  for (const Vec3 &v : shape.vertex) displaced(v);
+  for (const BodyRate &b : shape.body) {
+    displaced(b.translation);
+    twisted = std::max(twisted, b.spin.norm());
+    for (const double d : b.spin) note(d, twist);
+  }
+  for (const double t : shape.edge) note(t, twist);
+  twisted = std::max(twisted, std::abs(twist));
+  const bool turns = moved < 1e-6 * length * twisted;
+  const double scale = std::copysign(1 / (turns ? twisted : moved), turns ? twist : component);
+  for (Vec3 &v : shape.vertex) v *= scale;
+  for (double &t : shape.edge) t *= scale;
+  for (BodyRate &b : shape.body) b = BodyRate().add(scale, b);
+}
+
+} // namespace
+
+/// An equilibrium of any kind, by Newton from another one.
+PetscErrorCode BucklingPath::balance(const State &start, double factor, State *state, NewtonReport *report,
+                                     bool *found) {
+  PetscFunctionBeginUser;
+  Step step = TimeLoop::stepOf(settings_, start, 0);
+  step.time = step.load_factor = factor;
+  const SharpTolerance sharp(solver_);
+  PetscCall(solver_.solve(start, step, report, Seek::equilibrium));
+  *found = report->converged && SharpTolerance::isMet(report->residual);
+  *state = start;
+  if (*found) solver_.potential().commit(*state);
+  PetscFunctionReturn(0);
+}
+
+/// Those that do not cost nothing, from the lowest on: as many as that are always there are left out, the smallest.
+std::vector<std::size_t> BucklingPath::numbersOf(const Modes &modes) const {
+  std::vector<std::size_t> numbers(modes.eigenvalue.size());
+  std::iota(numbers.begin(), numbers.end(), std::size_t(0));
+  std::stable_sort(numbers.begin(), numbers.end(), [&](std::size_t a, std::size_t b) {
+    return std::abs(modes.eigenvalue[a]) < std::abs(modes.eigenvalue[b]);
+  });
+  numbers.erase(numbers.begin(), numbers.begin() + std::min<std::ptrdiff_t>(free_, std::ptrdiff_t(numbers.size())));
+  std::sort(numbers.begin(), numbers.end());
+  return numbers;
+}
+
+/// A point of the path with its softest motions.
+PetscErrorCode BucklingPath::reach(const Point &from, double factor, Point *to, Modes *modes) {
+  PetscFunctionBeginUser;
+  Modes here;
+  std::string failure;
+  Point point;
+  point.factor = factor;
+  PetscCall(balance(from.state, factor, &point.state, &point.report, &point.found));
+  if (point.found) PetscCall(modesAtIterate(solver_, Metric::shift, asked_, &here, &failure));
+  if (point.found && !failure.empty()) point.report.reason = failure;
+  point.found = point.found && failure.empty();
+  if (point.found) {
+    int free = 0;
+    for (int k = 0; k < here.count(); ++k) free += here.isFree(k);
+    const bool all = here.count() > 0 && here.eigenvalue.back() > here.zero; // none is beyond what was asked for
+    if (free_ < 0 || all) free_ = free_ < 0 ? free : std::min(free_, free);
+    for (const std::size_t k : numbersOf(here)) point.stiffness.push_back(here.eigenvalue[k]);
+    point.unstable = int(std::count_if(point.stiffness.begin(), point.stiffness.end(), [](double w) { return w < 0; }));
+  }
+  if (modes) *modes = std::move(here);
+  *to = std::move(point);
+  PetscFunctionReturn(0);
+}
+
+/// The same along the path: from there, Newton must come back. From a snap to another branch it does not.
+PetscErrorCode BucklingPath::advance(const Point &from, double factor, Point *to) {
+  constexpr double little = 1e-5; // of the size of the scene
+  PetscFunctionBeginUser;
+  PetscCall(reach(from, factor, to));
+  if (!to->found) PetscFunctionReturn(0);
+  State back;
+  NewtonReport report;
+  bool returned;
+  PetscCall(balance(to->state, from.factor, &back, &report, &returned));
+  to->found = returned && distanceBetween(solver_.team(), back, from.state) <= little;
+  if (!to->found) to->report.reason = "the nearest equilibrium is on another branch";
+  PetscFunctionReturn(0);
+}
+
+/// Takes roots over in the order of their factors.
+PetscErrorCode BucklingPath::note(std::vector<Root> &roots) {
+  constexpr double same = 1e-6; // of a factor: told once
+  PetscFunctionBeginUser;
+  std::stable_sort(roots.begin(), roots.end(), [](const Root &a, const Root &b) { return a.factor < b.factor; });
+  double told = -HUGE_VAL;
+  for (Root &root : roots) {
+    if (modes_.count() == count_) break;
+    modes_.load_factor.push_back(root.factor);
+    modes_.limit.push_back(root.limit);
+    scaleToOne(root.shape, lengthOfAll());
+    modes_.shape.push_back(root.shape);
+    if (!on_critical || root.factor - told <= same * std::abs(root.factor)) continue;
+    told = root.factor;
+    CriticalPoint point;
+    point.load_factor = root.factor;
+    point.state = root.below;
+    point.limit = root.limit;
+    PetscCall(on_critical(point));
+  }
+  PetscFunctionReturn(0);
+}
+
+double BucklingPath::lengthOfAll() const {
+  double length = 0;
+  for (int r = 0; r < solver_.potential().all().end; ++r) length += solver_.potential().length(r);
+  return length;
+}
+
+/// All roots between two points.
+PetscErrorCode BucklingPath::locateAll(const Point &at, const Point &next) {
+  PetscFunctionBeginUser;
+  std::vector<Root> all, roots;
+  const auto [least, most] = std::minmax(at.unstable, next.unstable);
+  near_ = {at, next};
+  for (int k = least; k < most && int(all.size()) < count_ - modes_.count(); k = least + int(all.size())) {
+    PetscCall(locate(k, at, next, true, next.unstable > at.unstable, &roots));
+    if (roots.empty()) {
+      failure_ = "between load factors " + shortText(at.factor) + " and " + shortText(next.factor) +
+                 " stability changes, but no critical load was found; take more -load_steps";
+      break;
+    }
+    all.insert(all.end(), roots.begin(), roots.end());
+  }
+  PetscCall(note(all));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode BucklingPath::begin(State &state, Point *at) {
+  PetscFunctionBeginUser;
+  const int all = int(solver_.potential().dofs().unknowns(solver_.potential().all()));
+  Point rest;
+  rest.state = state;
+  for (int more = 8;; more *= 4) { // motions that cost nothing, or are unstable from no load on
+    asked_ = std::min(all, count_ + more);
+    free_ = -1;
+    PetscCall(reach(rest, early * settings_.dt, at));
+    if (!at->found || at->unstable + free_ + 2 <= more || asked_ == all) break;
+  }
+  asked_ = std::min(all, count_ + at->unstable + free_ + 2);
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode BucklingPath::run(State &state, bool *finished) {
+  constexpr int few = 5; // iterations
+  constexpr double short_step = 0.02, shortest = 1e-4;
+  PetscFunctionBeginUser;
+  *finished = false;
+  Point at, before;
+  PetscCall(begin(state, &at));
+  if (!at.found) {
+    failure_ =
+        "there is no equilibrium to begin with, at load factor " + shortText(at.factor) + ": " + at.report.reason;
+    PetscFunctionReturn(0);
+  }
+  double h = settings_.dt - at.factor;
+  auto take = [&](Point &point) {
+    before = std::move(at);
+    at = std::move(point);
+    state = at.state;
+    ++state.step;
+    at.state.step = state.step;
+    return on_step ? on_step(state, at.report, at.unstable) : PetscErrorCode(0);
+  };
+  {
+    Point first = at;
+    PetscCall(take(first));
+  }
+  while (modes_.count() < count_ && at.factor < settings_.t_end && failure_.empty()) {
+    if (stops && stops()) PetscFunctionReturn(0);
+    Point next;
+    const double target = std::min(at.factor + h, settings_.t_end);
+    PetscCall(advance(at, target, &next));
+    if (next.found) {
+      if (next.unstable != at.unstable) PetscCall(locateAll(at, next));
+      if (next.report.iterations <= few) h *= 2;
+      PetscCall(take(next));
+      continue;
+    }
+    h *= 0.5;
+    if (h > short_step * target) continue;
+    std::vector<Root> roots;
+    Point end;
+    end.factor = target;
+    near_ = {at};
+    if (before.factor < at.factor) near_.push_back(before);
+    PetscCall(locate(at.unstable, at, end, false, true, &roots));
+    if (!roots.empty() && roots[0].limit) {
+      state = roots[0].below;
+      PetscCall(note(roots));
+      ending_ = "the load cannot rise beyond the limit point";
+      break;
+    }
+    if (h > shortest * target) continue;
+    failure_ = "the path of equilibria could not be followed beyond load factor " + shortText(at.factor) + ": " +
+               next.report.reason;
+  }
+  if (ending_.empty() && modes_.count() < count_ && failure_.empty())
+    ending_ = "the path was followed up to load factor " + shortText(at.factor);
+  *finished = true;
+  PetscFunctionReturn(0);
+}
+
+} // namespace tendril
