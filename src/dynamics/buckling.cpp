@@ -77,7 +77,7 @@ PetscErrorCode BucklingPath::reach(const Point &from, double factor, Point *to, 
   if (point.found) {
     int free = 0;
     for (int k = 0; k < here.count(); ++k) free += here.isFree(k);
-    const bool all = here.count() > 0 && here.eigenvalue.back() > here.zero; // none is beyond what was asked for
+    const bool all = here.count() > 0 && here.eigenvalue.back() > here.zero.back(); // none is beyond what was asked for
     if (free_ < 0 || all) free_ = free_ < 0 ? free : std::min(free_, free);
     for (const std::size_t k : numbersOf(here)) point.stiffness.push_back(here.eigenvalue[k]);
     point.unstable = int(std::count_if(point.stiffness.begin(), point.stiffness.end(), [](double w) { return w < 0; }));

@@ -299,13 +299,13 @@ PetscErrorCode modesAtIterate(StepSolver &solver, Metric metric, int count, Mode
       if (!failure->empty()) PetscFunctionReturn(0);
       const std::vector<double> values = one.eigenvalues();
       for (std::size_t k = 0; k < values.size(); ++k) all.push_back({values[k], islands.size() - 1, int(k)});
-      modes->zero = std::max(modes->zero, one.zero());
     }
   }
   std::stable_sort(all.begin(), all.end(), [](const Place &a, const Place &b) { return a.eigenvalue < b.eigenvalue; });
   all.resize(std::min(all.size(), std::size_t(count)));
   for (const Place &p : all) {
     modes->eigenvalue.push_back(p.eigenvalue);
+    modes->zero.push_back(islands[p.island].zero());
     PetscCall(islands[p.island].shape(p.number, &modes->shape.emplace_back()));
   }
   PetscFunctionReturn(0);

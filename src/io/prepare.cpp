@@ -93,7 +93,7 @@ static Scene sceneFor(Prepared &prepared, Options &o) {
   if (o.gravity) file.scene.gravity = *o.gravity;
   resolve(file.run, o);
   for (Rod &rod : file.scene.rods) rod.chooses_model = rod.chooses_model && o.modes == 0; // modes are in all directions
-  settleModels(file.scene, o.loop.dynamic || o.modes > 0,
+  settleModels(file.scene, o.loop.dynamic || (o.modes > 0 && !o.buckling),
                Team::world().isAlone() && (o.loop.dynamic || o.loop.continuation == Continuation::load),
                &prepared.notes);
   checkScene(file.scene, o, &prepared.notes);

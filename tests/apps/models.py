@@ -93,8 +93,8 @@ def restarts():
 
 def accuracies():
     """Edges that were chosen for planar rods are not those of rods that buckle: the run says so and ends."""
-    text = COLUMN.format(gravity="[0, 0, 0]", out=0.01, within=1) + "loads: [{vertex: last, force: [0.5, -0.01, 0]}]\n"
-    text = text.replace("torsional_stiffness: 1", "torsional_stiffness: 0.01")
+    text = COLUMN.format(gravity="[0, 0, 0]", out=1, within=0.01) + "loads: [{vertex: last, force: [0.5, -0.01, 0]}]\n"
+    text = text.replace("torsional_stiffness: 1", "torsional_stiffness: 0.01")  # the strip lies in the plane z = 0, on edge
     with tempfile.TemporaryDirectory() as folder:
         told = run(folder, text, "-model", "auto", "-accuracy", "1e-3", code=2)
         assert "lose their stability" in told and "take -model full" in told, told
@@ -124,6 +124,13 @@ def frequencies():
     of_plane = found["planar"][:2]
     assert np.allclose(of_plane, [found["full"][np.abs(found["full"] - w).argmin()] for w in of_plane], rtol=1e-7), found
     assert found["full"][0] < of_plane[0] * (1 - 1e-3), found
+    # A rod and a body that nothing holds are at rest as drawn: six motions cost nothing.
+    free = text.replace("[3, 0, 0]", "[0, 0, 0]").replace("supports: [{vertex: 0, type: clamp}]", "constraints: [{type: weld, body: hub, vertex: 0}]")
+    with tempfile.TemporaryDirectory() as folder:
+        run(folder, free + "bodies: [{name: hub, sphere: {radius: 0.05}, density: 1000}]\n", "-mode", "modes", "-modes", "8")
+        with h5py.File(f"{folder}/out/trajectory.h5") as f:
+            frequency = f["modes/frequency"][:]
+    assert np.all(frequency[:6] == 0) and np.all(frequency[6:] > 0.1), frequency
 
 
 buckling()

@@ -373,6 +373,23 @@ TEST(Modes, AreOrthonormalAndThoseOfEachRod) {
   }
 }
 
+/// What costs nothing is told by each rod's own stiffness: a stiff one beside a hair leaves its frequencies alone.
+TEST(Modes, OfAHairAreNotThoseOfAStiffRodBesideIt) {
+  Scene alone = straight(16, {"clamp", "free"});
+  for (double *k : {&alone.rods[0].material.flexural_stiffness[0], &alone.rods[0].material.flexural_stiffness[1],
+                    &alone.rods[0].material.torsional_stiffness, &alone.rods[0].material.axial_stiffness})
+    *k *= 1e-8;
+  Scene both = alone;
+  both.rods.push_back(straight(16, {"clamp", "free"}).rods[0]);
+  both.rods[1].name = "stiff";
+  both.supports.push_back(hold(both, 1, 0, Support::Kind::clamp));
+  const Modes hair = modesOf(alone, 4), all = modesOf(both, 4);
+  for (int k = 0; k < 4; ++k) {
+    EXPECT_FALSE(all.isFree(k)) << k;
+    EXPECT_NEAR(all.frequency(k) / hair.frequency(k), 1, 1e-9) << k;
+  }
+}
+
 /// Another factorisation, of the whole matrix by MUMPS, has the same eigenvalues; a net is one island of many rods.
 TEST(Modes, OfANetDoNotDependOnTheFactorisation) {
   const Folder folder;

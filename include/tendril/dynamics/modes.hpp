@@ -16,11 +16,11 @@ struct Modes {
   /// 1 kg m^2; of both signs that with a positive largest displacement, or twist where nothing is displaced. Twist: by
   /// which an edge turns about its tangent, parallel transport taken off.
   std::vector<Rates> shape;
-  double zero = 0; ///< eigenvalues up to this size are those of motions that cost nothing, to rounding [1/s^2]
+  std::vector<double> zero; ///< (n) up to this size they are of motions that cost nothing, to rounding [1/s^2]
 
   int count() const { return int(eigenvalue.size()); }
-  bool isFree(int k) const { return std::abs(eigenvalue[std::size_t(k)]) <= zero; }
-  bool isUnstable(int k) const { return eigenvalue[std::size_t(k)] < -zero; }
+  bool isFree(int k) const { return std::abs(eigenvalue[std::size_t(k)]) <= zero[std::size_t(k)]; }
+  bool isUnstable(int k) const { return eigenvalue[std::size_t(k)] < -zero[std::size_t(k)]; }
   double frequency(int k) const;  ///< 0 of free and unstable ones [rad/s]
   double growthRate(int k) const; ///< of unstable ones, or 0 [1/s]
 };
