@@ -360,11 +360,10 @@ PetscErrorCode NewtonSolver::settleMinimum(Seek seek, Outcome *now) {
       now->failure = "the equilibrium is unstable" + now->beyond;
       break;
     }
-    const Scene &scene = potential_->scene();
     // Couples have no minimum to speak of. What friction at the surface holds may roll, and does so from rounding.
     auto rolls = [&](RodSet island) {
       for (int r = island.begin; r < island.end; ++r)
-        if (scene.touches(r) && carriesSurface(scene.rods[r])) return true;
+        if (potential_->scene().touches(r) && carriesSurface(potential_->scene().rods[r])) return true;
       return circulatory_ && circulatory_->acts(island);
     };
     for (const RodSet island : islands_)
