@@ -64,7 +64,7 @@ inline void draw(Net &net, Random &random, int rods, int nodes, bool frames) {
     if (random() > 0.5 && edges > 5) net.scene.supports.push_back(hold(net.scene, r, 1, Support::Kind::pin));
   }
   std::erase_if(net.scene.junctions, [](const Junction &j) { return j.members.size() < 2; });
-  if (random() > 0) {
+  if (random() > 0 && !net.scene.junctions.empty()) {
     const Junction::Member &m = net.scene.junctions[0].members[0];
     net.scene.supports.push_back(hold(net.scene, m.rod, m.vertex, Support::Kind::pin));
   }
