@@ -16,13 +16,15 @@ PetscErrorCode TimeLoop::solveStages(const State &start, State *next, Attempt *n
   const double h = now->h;
   stages_.clear();
   actions_.clear();
+  StageRule rule; // of the last stage, which the potential has until the step ends; and what it refers to
+  std::vector<double> behind;
   for (bool more = true; more;) {
-    StageRule rule = integrator_->stage(start, h, stages_);
+    rule = integrator_->stage(start, h, stages_);
     Step stage = now->step;
     stage.dt = rule.dt;
     stage.rule = &rule;
     if (rule.fraction != 1) stage.time = start.time + rule.fraction * h;
-    std::vector<double> behind;
+    behind.clear();
     if (dissipates && rule.tangent_rates) behind = strainsBehind(solver_, start, stage);
     if (!behind.empty()) rule.damping_past = {{-1, behind.data()}};
     actions_.emplace_back(2 * moving_.size());
