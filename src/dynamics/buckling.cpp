@@ -1,6 +1,7 @@
 #include "tendril/dynamics/buckling.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -8,6 +9,22 @@ namespace tendril {
 namespace {
 
 constexpr double early = 1e-3; // of the first step: where the path begins, for without loads a rod may be anywhere
+
+/// How far a state lies from the middle of two others, over how far these are apart; 0 where they are one to rounding.
+double bendOf(const State &from, const State &middle, const State &to) {
+  constexpr double rounding = 1e-10; // of the coordinates
+  double apart = 0, off = 0, size = 0;
+  auto add = [&](const std::vector<Vec3> &a, const std::vector<Vec3> &m, const std::vector<Vec3> &b) {
+    for (std::size_t v = 0; v < a.size(); ++v) {
+      apart = std::max(apart, (b[v] - a[v]).norm());
+      off = std::max(off, (m[v] - 0.5 * (a[v] + b[v])).norm());
+      size = std::max(size, (a[v] - a[0]).norm());
+    }
+  };
+  add(from.position, middle.position, to.position);
+  add(from.body_position, middle.body_position, to.body_position);
+  return apart > rounding * size ? off / apart : 0;
+}
 
 /// Makes the largest displacement, or where nothing is displaced the largest twist, one; of both signs that with a
 /// positive largest component.
@@ -75,7 +92,7 @@ PetscErrorCode BucklingPath::reach(const Point &from, double factor, Point *to, 
   if (point.found && !failure.empty()) point.report.reason = failure;
   point.found = point.found && failure.empty();
   if (point.found) {
-    int free = 0;
+    int &free = point.free;
     for (int k = 0; k < here.count(); ++k) free += here.isFree(k);
     const bool all = here.count() > 0 && here.eigenvalue.back() > here.zero.back(); // none is beyond what was asked for
     if (free_ < 0 || all) free_ = free_ < 0 ? free : std::min(free_, free);
@@ -87,12 +104,27 @@ PetscErrorCode BucklingPath::reach(const Point &from, double factor, Point *to, 
   PetscFunctionReturn(0);
 }
 
-/// The same along the path: from there, Newton must come back. From a snap to another branch it does not.
+/// The same along the path: Newton must come there by two steps, too, through a point about in the middle, and back.
+/// After a snap to another branch it does not, in either half, however short the step.
 PetscErrorCode BucklingPath::advance(const Point &from, double factor, Point *to) {
   constexpr double little = 1e-5; // of the size of the scene
+  // That of a parabola whose slope doubles is 1/12; of a root up to a limit point, and over to the branch that comes
+  // back from there, it is below and above (sqrt(2) - 1)/2 = 0.207; of a snap a half.
+  constexpr double bent = 0.15;
   PetscFunctionBeginUser;
-  PetscCall(reach(from, factor, to));
+  Point middle;
+  PetscCall(balance(from.state, 0.5 * (from.factor + factor), &middle.state, &middle.report, &middle.found));
+  *to = {};
+  to->factor = factor;
+  to->report = middle.report;
+  if (!middle.found) PetscFunctionReturn(0);
+  PetscCall(reach(middle, factor, to));
   if (!to->found) PetscFunctionReturn(0);
+  if (bendOf(from.state, middle.state, to->state) > bent) {
+    to->found = false;
+    to->report.reason = "it bends too sharply, or the nearest equilibrium is on another branch";
+    PetscFunctionReturn(0);
+  }
   State back;
   NewtonReport report;
   bool returned;
@@ -131,22 +163,43 @@ double BucklingPath::lengthOfAll() const {
   return length;
 }
 
-/// All roots between two points.
-PetscErrorCode BucklingPath::locateAll(const Point &at, const Point &next) {
+/// All roots between two points. \param snapped where that is not one piece of a path
+PetscErrorCode BucklingPath::locateAll(const Point &at, const Point &next, bool *snapped) {
   PetscFunctionBeginUser;
   std::vector<Root> all, roots;
   const auto [least, most] = std::minmax(at.unstable, next.unstable);
   near_ = {at, next};
+  *snapped = false;
   for (int k = least; k < most && int(all.size()) < count_ - modes_.count(); k = least + int(all.size())) {
     PetscCall(locate(k, at, next, true, next.unstable > at.unstable, &roots));
-    if (roots.empty()) {
-      failure_ = "between load factors " + shortText(at.factor) + " and " + shortText(next.factor) +
-                 " stability changes, but no critical load was found; take more -load_steps";
-      break;
-    }
+    *snapped = roots.empty() || roots[0].limit; // nothing leads beyond a limit point
+    if (*snapped) PetscFunctionReturn(0);
     all.insert(all.end(), roots.begin(), roots.end());
   }
   PetscCall(note(all));
+  PetscFunctionReturn(0);
+}
+
+/// Whether the load cannot rise beyond a factor: the path comes there as the root of what is left of the load, while it
+/// goes straight through a bifurcation.
+PetscErrorCode BucklingPath::isLimit(const Point &low, double factor, bool *limit) {
+  constexpr double nearest = 3e-5;  // of the factor
+  constexpr double between = 0.375; // along a root the second step is half of the first, straight on a quarter
+  std::array<State, 3> at;
+  PetscFunctionBeginUser;
+  *limit = false;
+  State from = low.state;
+  for (std::size_t k = 0; k < at.size(); ++k) {
+    NewtonReport report;
+    bool found;
+    const double there = factor - nearest * std::pow(4.0, 2.0 - double(k)) * std::abs(factor);
+    PetscCall(balance(from, there, &at[k], &report, &found));
+    if (!found) PetscFunctionReturn(0);
+    from = at[k];
+  }
+  const double first = distanceBetween(solver_.team(), at[0], at[1]),
+               second = distanceBetween(solver_.team(), at[1], at[2]);
+  *limit = first > 1e-9 && second > between * first;
   PetscFunctionReturn(0);
 }
 
@@ -162,6 +215,13 @@ PetscErrorCode BucklingPath::begin(State &state, Point *at) {
     if (!at->found || at->unstable + free_ + 2 <= more || asked_ == all) break;
   }
   asked_ = std::min(all, count_ + at->unstable + free_ + 2);
+  // Unstable there: what is so at any load is none of the modes, others have their critical loads before.
+  constexpr int most = 4;
+  Point first = *at;
+  for (int k = 0; k < most && at->found && first.found && first.unstable > 0; ++k) {
+    PetscCall(reach(rest, 1e-3 * first.factor, &first));
+    if (first.found && first.unstable < at->unstable && first.free <= at->free) *at = first;
+  }
   PetscFunctionReturn(0);
 }
 
@@ -177,7 +237,7 @@ PetscErrorCode BucklingPath::run(State &state, bool *finished) {
         "there is no equilibrium to begin with, at load factor " + shortText(at.factor) + ": " + at.report.reason;
     PetscFunctionReturn(0);
   }
-  double h = settings_.dt - at.factor;
+  double h = at.factor < 0.5 * early * settings_.dt ? 100 * at.factor : settings_.dt - at.factor;
   auto take = [&](Point &point) {
     before = std::move(at);
     at = std::move(point);
@@ -185,6 +245,16 @@ PetscErrorCode BucklingPath::run(State &state, bool *finished) {
     ++state.step;
     at.state.step = state.step;
     return on_step ? on_step(state, at.report, at.unstable) : PetscErrorCode(0);
+  };
+  auto look = [&](Point &next) {
+    bool snapped = false;
+    PetscFunctionBeginUser;
+    if (next.found && next.unstable != at.unstable) PetscCall(locateAll(at, next, &snapped));
+    if (snapped)
+      next.report.reason = "stability changes before load factor " + shortText(next.factor) +
+                           ", but no critical load was found; take more -load_steps";
+    next.found = next.found && !snapped;
+    PetscFunctionReturn(0);
   };
   {
     Point first = at;
@@ -195,8 +265,8 @@ PetscErrorCode BucklingPath::run(State &state, bool *finished) {
     Point next;
     const double target = std::min(at.factor + h, settings_.t_end);
     PetscCall(advance(at, target, &next));
+    PetscCall(look(next));
     if (next.found) {
-      if (next.unstable != at.unstable) PetscCall(locateAll(at, next));
       if (next.report.iterations <= few) h *= 2;
       PetscCall(take(next));
       continue;
@@ -209,7 +279,18 @@ PetscErrorCode BucklingPath::run(State &state, bool *finished) {
     near_ = {at};
     if (before.factor < at.factor) near_.push_back(before);
     PetscCall(locate(at.unstable, at, end, false, true, &roots));
-    if (!roots.empty() && roots[0].limit) {
+    bool turns_back = false;
+    if (!roots.empty() && roots[0].limit) PetscCall(isLimit(at, roots[0].factor, &turns_back));
+    if (!roots.empty() && !turns_back) { // Newton fails at a bifurcation, and beyond it goes on
+      for (double beyond = 1e-3; beyond < 0.05 && !next.found; beyond *= 2)
+        PetscCall(advance(at, std::max(target, roots[0].factor) * (1 + beyond), &next));
+      PetscCall(look(next));
+      if (next.found) {
+        PetscCall(take(next));
+        continue;
+      }
+    }
+    if (turns_back) {
       state = roots[0].below;
       PetscCall(note(roots));
       ending_ = "the load cannot rise beyond the limit point";

@@ -1,4 +1,5 @@
 /// Critical load factors between two points of a path of equilibria.
+#include "tendril/dynamics/bifurcation.hpp"
 #include "tendril/dynamics/buckling.hpp"
 #include "tendril/solver/activity.hpp"
 
@@ -22,6 +23,19 @@ double atZero(std::vector<std::pair<double, double>> p, std::size_t count) {
       p[i].second =
           (p[i].first * p[i + 1].second - p[i + order].first * p[i].second) / (p[i].first - p[i + order].first);
   return p[0].second;
+}
+
+/// Whether a state lies no farther from both ends of a piece of a path than these are apart, but for rounding.
+bool liesBetween(const State &low, const State &state, const State &high) {
+  constexpr double rounding = 1e-7, room = 1.5;
+  double apart = 0, away = 0, size = 0;
+  for (std::size_t v = 0; v < low.position.size(); ++v) {
+    apart = std::max(apart, (high.position[v] - low.position[v]).norm());
+    away =
+        std::max({away, (state.position[v] - low.position[v]).norm(), (state.position[v] - high.position[v]).norm()});
+    size = std::max(size, (low.position[v] - low.position[0]).norm());
+  }
+  return away <= room * apart + rounding * size;
 }
 
 /// Components of motions, twists and spins times a length.
@@ -78,7 +92,8 @@ double BucklingPath::estimate(int k, double low, double high) const {
 /// All roots between two points beside them, one for each count. The motions that are soft at both span nearly one
 /// space, in which the Hessian is taken as linear in the load factor: diagonal by the motions of `a` there, and at `b`
 /// by its own, which the overlap O relates to those of `a`. So modes are told apart however close their loads are.
-PetscErrorCode BucklingPath::resolve(const Point &a, const Point &b, std::vector<Root> *roots) {
+/// \param apart how far they may be apart, over the size of the scene; farther, they are on two branches
+PetscErrorCode BucklingPath::resolve(const Point &a, const Point &b, double apart, std::vector<Root> *roots) {
   constexpr double soft = 30; // times the stiffness of what changes its sign
   PetscFunctionBeginUser;
   roots->clear();
@@ -88,6 +103,7 @@ PetscErrorCode BucklingPath::resolve(const Point &a, const Point &b, std::vector
   PetscCall(reach(b, b.factor, &at[1], &modes[1]));
   const int first = std::min(at[0].unstable, at[1].unstable), last = std::max(at[0].unstable, at[1].unstable);
   if (!at[0].found || !at[1].found || first == last) PetscFunctionReturn(0);
+  if (distanceBetween(solver_.team(), at[0].state, at[1].state) > apart) PetscFunctionReturn(0);
   const double sign = at[0].unstable < at[1].unstable ? 1 : -1, length = lengthOfAll();
   const int known = int(std::min(at[0].stiffness.size(), at[1].stiffness.size()));
   double largest = 0;
@@ -152,6 +168,7 @@ PetscErrorCode BucklingPath::locate(int k, Point low, Point high, bool ahead, bo
   const Doing here([](std::ostream &out) { out << "a critical load is searched for"; });
   roots->clear();
   double last = std::nan(""), width = high.factor - low.factor;
+  const double whole = width, whole_apart = ahead ? distanceBetween(solver_.team(), low.state, high.state) : HUGE_VAL;
   for (int round = 0; round < most_rounds; ++round) {
     for (const Point &p : near_) // the tightest bracket
       if (p.factor > low.factor && p.factor < high.factor) {
@@ -164,7 +181,8 @@ PetscErrorCode BucklingPath::locate(int k, Point low, Point high, bool ahead, bo
     const bool agrees = std::abs(found - last) <= agreement * size;
     last = found;
     if (ahead && now <= 2.2 * beside * size) {
-      PetscCall(resolve(low, high, roots));
+      // The path may go like a root of the load there, no faster.
+      PetscCall(resolve(low, high, 1e-7 + 3 * whole_apart * std::sqrt(now / whole), roots));
       PetscFunctionReturn(0);
     }
     if (!ahead && agrees && before <= 2 * closest * size) {
@@ -185,6 +203,7 @@ PetscErrorCode BucklingPath::locate(int k, Point low, Point high, bool ahead, bo
     for (const double other : {factor, low.factor + 0.4 * now}) {
       const Point from = ahead ? nearest(other) : low;
       PetscCall(ahead ? reach(from, other, &point) : advance(from, other, &point));
+      point.found = point.found && (!ahead || liesBetween(low.state, point.state, high.state));
       if (point.found || !ahead) break;
     }
     if (point.found)

@@ -49,6 +49,8 @@ void multiplyMass(const IncrementalPotential &potential, RodSet islands, const P
   dofs.foldJoined(islands, out);
 }
 
+constexpr double little_spin = 1e-9; // of the torsional stiffness of a rod
+
 int massRank(const IncrementalPotential &potential, RodSet islands) {
   const Elements &e = potential.elements();
   const DofMap &dofs = potential.dofs();
@@ -56,7 +58,7 @@ int massRank(const IncrementalPotential &potential, RodSet islands) {
   for (int r = islands.begin; r < islands.end; ++r) {
     const RodRange &rod = e.rods[r];
     for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) {
-      if (dofs.unknown(s, 0) >= 0 && e.mass()[s] > 0) rank += 3;
+      for (int a = 0; a < 3; ++a) rank += dofs.unknown(s, a) >= 0 && e.mass()[s] > 0; // planar rods have two
       if (dofs.unknown(s, 3) >= 0 && e.twistMass()[s] > 0) ++rank;
     }
     rank += 6 * int(e.bodies({r, r + 1}).size());
@@ -88,7 +90,16 @@ PetscErrorCode NewtonSolver::factorWith(Metric metric, RodSet island, double fac
   potential_->assemble(island, HessianKind::exact);
   PetscCall(makeMatrix());
   EdgeBlocks blocks = potential_->blocks();
-  if (metric == Metric::mass) addMass(*potential_, island, factor, blocks);
+  if (metric == Metric::mass) {
+    addMass(*potential_, island, factor, blocks);
+    // A spin that costs nothing and has no inertia has no frequency: a little stiffness at one edge tells where it is.
+    for (int r = island.begin; r < island.end; ++r) {
+      const RodRange &rod = potential_->elements().rods[r];
+      const Material &m = potential_->scene().rods[r].material;
+      if (rod.twist && m.linear_rotational_inertia == 0)
+        blocks.entry(rod, EdgeBlocks::own(3, 3))[0] += little_spin * m.torsional_stiffness / potential_->length(r);
+    }
+  }
   system_.blocks = &blocks;
   PetscCall(refactor());
   system_.blocks = &potential_->blocks();

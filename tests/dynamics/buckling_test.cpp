@@ -17,7 +17,7 @@ struct Buckled {
   std::string ending;
 };
 
-Buckled buckle(const Scene &scene, int count, double step = 1, double last = 100) {
+Buckled buckle(const Scene &scene, int count, double step = 1, double last = 100, bool may_fail = false) {
   LoopSettings settings = statics();
   settings.dt = step;
   settings.t_end = last;
@@ -32,7 +32,7 @@ Buckled buckle(const Scene &scene, int count, double step = 1, double last = 100
   bool finished = false;
   EXPECT_EQ(path.run(sim.state, &finished), 0);
   EXPECT_TRUE(finished);
-  EXPECT_EQ(path.failure(), "");
+  if (!may_fail) EXPECT_EQ(path.failure(), "");
   found.modes = path.modes();
   found.ending = path.ending();
   return found;
@@ -300,6 +300,66 @@ TEST(BucklingModes, OfModelsAreThoseOfTheirMotions) {
   const std::vector<double> round = factorsOf(scene, 4);
   EXPECT_NEAR(round[0], all[0], 1e-8 * all[0]);
   EXPECT_NEAR(round[1], all[0], 1e-8 * all[0]);
+}
+
+/// The path of a column with a side load bends away from the straight one and has no critical point. Newton's answers
+/// for larger steps are on others, whose signs are no change of stability.
+TEST(BucklingModes, AreNoneOfAnImperfectColumn) {
+  for (const double aside : {0.01, 0.1})
+    for (const double step : {1.0, 0.5, 0.25, 0.1}) {
+      Scene scene = standing(20, 1, 0);
+      scene.rods[0].material.axial_stiffness = 1e6;
+      scene.rods[0].model = RodModel::planar;
+      scene.rods[0].flat = 2;
+      scene.forces[0].force[1] = aside;
+      EXPECT_EQ(buckle(scene, 1, step, 10, true).modes.count(), 0) << aside << ' ' << step;
+    }
+}
+
+/// Critical loads far below the first step, before which the path would begin, are the lowest ones all the same.
+TEST(BucklingModes, AreFoundFarBelowTheFirstStep) {
+  for (const double load : {3e3, 1e5, 1e6}) {
+    const std::vector<double> factors = factorsOf(standing(20, load, 0), 3);
+    EXPECT_NEAR(factors[0] * load, pi * pi / 4, 2e-3 * pi * pi / 4) << load; // (pi/2/20)^2/12 and the compression
+    EXPECT_NEAR(factors[1] / factors[0], 1, 1e-6) << load;
+  }
+}
+
+/// Where Newton gives up, that is no limit point.
+TEST(BucklingModes, AreNoLimitPointsWhereNewtonGivesUp) {
+  const OptionSet one("-snes_max_it", "1");
+  const Buckled found = buckle(standing(20, 1, 0), 3, 1, 100, true);
+  for (int k = 0; k < found.modes.count(); ++k) EXPECT_FALSE(found.modes.limit[std::size_t(k)]) << k;
+  EXPECT_EQ(found.ending.find("limit point"), std::string::npos) << found.ending;
+}
+
+/// A low arch sways before its load cannot rise any more, whatever the steps.
+TEST(BucklingModes, OfALowArchAreASwayAndALimitPoint) {
+  std::vector<Vec3> points;
+  for (int k = 0; k <= 24; ++k) points.push_back(Vec3(k / 24.0, 0.05 * std::sin(pi * k / 24.0), 0));
+  Scene scene;
+  scene.gravity = Vec3::Zero();
+  scene.rods = {inextensibleRod(points, Measure::angle)};
+  scene.rods[0].material.axial_stiffness = 1e4;
+  scene.rods[0].material.linear_rotational_inertia = 0;
+  scene.rods[0].model = RodModel::planar;
+  scene.rods[0].flat = 2;
+  scene.supports = {hold(scene, 0, 0, Support::Kind::pin), hold(scene, 0, 24, Support::Kind::pin)};
+  scene.forces = {{0, 12, Vec3(0, -10, 0)}};
+  double first = 0, second = 0;
+  for (const double step : {1.0, 0.2, 1.0 / 7, 0.05}) {
+    const BucklingModes modes = buckle(scene, 2, step).modes;
+    ASSERT_EQ(modes.count(), 2) << step;
+    EXPECT_FALSE(modes.limit[0]) << step;
+    EXPECT_TRUE(modes.limit[1]) << step;
+    if (step == 1) {
+      first = modes.load_factor[0];
+      second = modes.load_factor[1];
+      EXPECT_NEAR(second, bisected(scene, 10, Continuation::arclength), 0.02 * second); // that stops at the sway
+    }
+    EXPECT_NEAR(modes.load_factor[0], first, 1e-6 * first) << step;
+    EXPECT_NEAR(modes.load_factor[1], second, 1e-6 * second) << step;
+  }
 }
 
 /// What hangs and is pulled has none.

@@ -353,6 +353,29 @@ joints:
   for (const int k : {0, 1}) EXPECT_NEAR(modes.eigenvalue[std::size_t(k)], exact[k], 1e-5 * exact[k]);
 }
 
+/// A spin that nothing holds and that has no inertia has no frequency, and is none of the modes.
+TEST(Modes, LeaveOutASpinWithoutInertia) {
+  Scene scene = straight(32, {"pin", "pin"});
+  scene.rods[0].material.linear_rotational_inertia = 0;
+  const Modes modes = modesOf(scene, 4);
+  for (const int k : {0, 1}) EXPECT_NEAR(modes.frequency(k), pi * pi, 1e-2) << k;     // (pi/32)^2/12 of it
+  for (const int k : {2, 3}) EXPECT_NEAR(modes.frequency(k), 4 * pi * pi, 0.15) << k; // four times as much
+}
+
+/// Rods in a plane have those in it, whichever plane that is.
+TEST(Modes, OfPlanarRodsInEachPlane) {
+  for (int flat = 0; flat < 3; ++flat) {
+    Vec3 end = Vec3::Zero();
+    end[(flat + 1) % 3] = 1;
+    Scene scene = clampedScene(inextensibleRod(lineShape(Vec3::Zero(), end, 32).points));
+    scene.rods[0].model = RodModel::planar;
+    scene.rods[0].flat = flat;
+    const Modes modes = modesOf(scene, 2);
+    EXPECT_NEAR(modes.frequency(0), 3.516015, 1e-2) << flat; // of (beta h)^2
+    EXPECT_NEAR(modes.frequency(1), 22.03449, 1e-1) << flat;
+  }
+}
+
 /// Modes are orthonormal by the masses, and rods that nothing joins have theirs each.
 TEST(Modes, AreOrthonormalAndThoseOfEachRod) {
   Scene scene = straight(12, {"clamp", "free"});

@@ -47,6 +47,7 @@ private:
     State state;
     std::vector<double> stiffness; ///< eigenvalues from the lowest on, but for motions that cost nothing [1/s^2]
     int unstable = 0;              ///< how many of them are negative
+    int free = 0;                  ///< motions that cost nothing
     bool found = false;
     NewtonReport report;
   };
@@ -68,14 +69,15 @@ private:
   PetscErrorCode reach(const Point &from, double factor, Point *to, Modes *modes = nullptr);
   PetscErrorCode advance(const Point &from, double factor, Point *to);
   PetscErrorCode begin(State &state, Point *at);
+  PetscErrorCode isLimit(const Point &low, double factor, bool *limit);
   std::vector<std::size_t> numbersOf(const Modes &modes) const;
   const Point &nearest(double factor) const;
   double estimate(int k, double low, double high) const;
   PetscErrorCode locate(int k, Point low, Point high, bool ahead, bool rising, std::vector<Root> *roots);
-  PetscErrorCode resolve(const Point &a, const Point &b, std::vector<Root> *roots);
+  PetscErrorCode resolve(const Point &a, const Point &b, double apart, std::vector<Root> *roots);
   PetscErrorCode takeLimit(const Point &low, double factor, int k, std::vector<Root> *roots);
   double lengthOfAll() const;
-  PetscErrorCode locateAll(const Point &at, const Point &next);
+  PetscErrorCode locateAll(const Point &at, const Point &next, bool *snapped);
   PetscErrorCode note(std::vector<Root> &roots);
 };
 
