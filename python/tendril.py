@@ -360,10 +360,11 @@ class Joint:
 class Modes:
     """Modes, n from the lowest on. Of a run with -mode modes small motions about the last frame: it moves by shape times
     cos(frequency t), or in one that grows by shape times exp(growth_rate t). Their kinetic energy is that of 1 kg m^2:
-    the shapes are orthonormal by the masses.
+    the shapes are orthonormal by the masses, where all forces have a potential. Flutter is two modes that follow each
+    other, with a frequency and a growth_rate g: exp(g t) (shape cos(frequency t) + next shape sin(frequency t)).
 
-    frequency (n,) [rad/s], 0 of motions that cost nothing and of those that grow; growth_rate (n,) [1/s], 0 where the
-    equilibrium is stable; eigenvalue (n,) [1/s^2], their squares, negative of those that grow;
+    frequency (n,) [rad/s], 0 of motions that cost nothing and of those that grow without flutter; growth_rate (n,)
+    [1/s], 0 where the equilibrium is stable; eigenvalue (n,) [1/s^2], the real part of (frequency + i growth_rate)^2;
     shape (n, vertices, 3) [m]; twist (n, edges) [rad], of edges about their tangents, parallel transport taken off;
     body_shape (n, bodies, 3) [m] of the origins of bodies, body_rotation (n, bodies, 3) [rad], rotation vectors.
 

@@ -5,16 +5,18 @@
 /// Bertsekas, *Constrained Optimization and Lagrange Multiplier Methods*, 1982, 2.2 and 4.2). docs/theory.md has more.
 #include "tendril/coupling/couplings.hpp"
 #include "tendril/coupling/held_bodies.hpp"
-#include "tendril/energy/joint.hpp"
+#include "tendril/energy/linkage.hpp"
 #include "tendril/state/spin_stage.hpp"
 
 #include <limits>
+#include <map>
 
 namespace tendril {
 namespace {
 
 /// By how much stiffer than what it holds an exact joint is between two updates of its forces: each takes the error of
-/// these down by as much. In statics it does with less; bodies that are not alike take at most so much of the softer.
+/// these down by as much. In statics those that close loops do with less; bodies that are not alike take at most so
+/// much of the softer.
 constexpr double stiffer = 1e6, stiffer_in_statics = 1e3, stiffest = 1e9;
 /// Slots of forces of a drive and of an end of the range.
 constexpr int drive_force = 6, range_force = 7;
@@ -22,7 +24,8 @@ constexpr int drive_force = 6, range_force = 7;
 class Joints final : public Term {
 public:
   Joints(const Scene &scene, const Elements &elements)
-      : scene_(scene), elements_(elements), work_(scene.joints.size()), held_(whatHolds(scene, elements)) {
+      : scene_(scene), elements_(elements), work_(scene.joints.size()), held_(whatHolds(scene, elements)),
+        linkage_(scene, elements) {
     for (const BodyPair &p : elements.pairs({0, int(elements.rods.size())}))
       if (p.joint >= 0) pairs_.items.push_back(p);
     pairs_.sort(elements.rods.size());
@@ -109,14 +112,14 @@ public:
       Mat12 h = Mat12::Zero();
       for (int k = 0; k < joint_rows; ++k) {
         const JointRow &row = rows[std::size_t(k)];
-        if (law.slope[k] != 0 && hessian != HessianKind::gauss_newton) h += law.slope[k] * row.hessian;
+        if (law.slope[k] != 0 && hessian == HessianKind::exact) h += law.slope[k] * row.hessian;
         for (int l = 0; l < joint_rows; ++l)
           if (law.curvature(k, l) != 0)
             h += law.curvature(k, l) * row.gradient * rows[std::size_t(l)].gradient.transpose();
       }
       // A body on two balls turns freely about the line between: above what Newton leaves undone there.
-      constexpr double neutral = 1e-12;
       const Work &w = work_[std::size_t(p.joint)];
+      const double neutral = 1e-12 * (linkage_.isOfTree(p.joint) ? stiffer_in_statics / stiffer : 1);
       for (int k = 0; k < 3 && w.is_static; ++k) {
         h(3 + k, 3 + k) += neutral * w.stiffness * place.arm.squaredNorm();
         h(9 + k, 9 + k) += neutral * w.stiffness * place.parent_arm.squaredNorm();
@@ -172,6 +175,29 @@ public:
     return most;
   }
 
+  /// From leaves to roots: the force L of a joint does with what it carries no work in motions U of the body that it
+  /// places by which alone what it holds changes: shifts along its axes, and turns about its point.
+  bool carry(int rod, const Planes &gradient, Configuration &iterate) override {
+    const std::span<const Linkage::TreeJoint> joints = linkage_.trees(rod);
+    for (const Linkage::TreeJoint &j : joints) { // out of balance, of all bodies of the trees
+      const BodyPair &p = elements_.pairOf(j.joint);
+      for (int k = 0; k < p.variables(); ++k) carried_[p.of[k / 3]][k % 3] = gradient[k % 3][p.of[k / 3]];
+    }
+    for (auto j = joints.rbegin(); j != joints.rend(); ++j) {
+      const BodyPair &p = elements_.pairOf(j->joint);
+      const Joint &joint = jointOf(p);
+      const JointPlace place = placeOf(joint, p, elements_, iterate);
+      Eigen::Vector<double, 6> body;
+      for (const int k : {0, 1}) body.segment<3>(3 * k) = carried_[p.of[std::size_t(k + (j->places_parent ? 2 : 0))]];
+      const Rows forces = carryingForces(joint, place, j->places_parent, body);
+      for (int k = 0; k < coordinate_row; ++k) iterate[Configuration::axial_force][p.first + k] += forces[k];
+      const Vec12 on_both = JointLaw().gradient(rowsOf(joint, place), forces);
+      for (int k = 0; k < p.variables() / 3; ++k) carried_[p.of[std::size_t(k)]] += on_both.segment<3>(3 * k);
+      takeForces(p, iterate);
+    }
+    return !joints.empty();
+  }
+
   void commit(State &state, const Configuration &c, int rod) const override {
     for (const BodyPair &p : pairs(rod)) {
       JointState &joint = state.joints[std::size_t(p.joint)];
@@ -213,6 +239,8 @@ private:
   const Elements &elements_;
   mutable std::vector<Work> work_;
   std::vector<Held> held_;
+  Linkage linkage_;
+  std::map<int, Vec3> carried_; ///< by slots, while forces of trees are found
   ByRod<BodyPair> pairs_;
 
   std::span<const BodyPair> pairs(int rod) const { return pairs_.of({rod, rod + 1}); }
@@ -271,7 +299,9 @@ private:
     }
     const Rod &host = scene_.rods[std::size_t(joint.rod)];
     const double any = host.material.axial_stiffness / host.length(), size = sizeOf(joint);
-    const double times = step.isStatic() && !step.small_motions ? stiffer_in_statics : stiffer;
+    const bool does_with_less =
+        step.isStatic() && !step.small_motions && !linkage_.isOfTree(int(&joint - &scene_.joints[0]));
+    const double times = does_with_less ? stiffer_in_statics : stiffer;
     auto between = [&](double low, double high, double other) {
       return high > 0 ? std::min(times * high, stiffest * (low > 0 ? low : high)) : times * other;
     };

@@ -2,19 +2,27 @@
 
 #include "tendril/dynamics/bifurcation.hpp"
 #include "tendril/solver/activity.hpp"
+#include "tendril/solver/circulatory.hpp"
 #include "tendril/solver/mass.hpp"
 
 #include <slepceps.h>
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <deque>
+#include <optional>
 
 namespace tendril {
 
-double Modes::frequency(int k) const { return isFree(k) ? 0 : std::sqrt(std::max(eigenvalue[std::size_t(k)], 0.0)); }
+double Modes::frequency(int k) const {
+  return isFree(k) ? 0 : std::sqrt(std::complex(eigenvalue[std::size_t(k)], imaginary[std::size_t(k)])).real();
+}
 
-double Modes::growthRate(int k) const { return isFree(k) ? 0 : std::sqrt(std::max(-eigenvalue[std::size_t(k)], 0.0)); }
+double Modes::growthRate(int k) const {
+  return isFree(k) ? 0
+                   : std::abs(std::sqrt(std::complex(eigenvalue[std::size_t(k)], imaginary[std::size_t(k)])).imag());
+}
 
 int massRank(const IncrementalPotential &potential) { return massRank(potential, potential.all()); }
 
@@ -24,6 +32,7 @@ using OwnedEPS = Owned<EPS, EPSDestroy>;
 
 constexpr double residual_tolerance = 1e-10; // of eigenvectors: eigenvalues are right to its square over their distance
 constexpr double free_part = 1e-10, stretch_part = 300 * epsilon; // of the shift; of EA/(rho L^2)
+constexpr double complex_part = 1e-6; // of an eigenvalue: about the root of its error, by which two that are one split
 
 /// SLEPc, which has no use for the command line, until PETSc ends.
 PetscErrorCode startSlepc() {
@@ -41,11 +50,14 @@ public:
   /// \param work right-hand sides and solutions of the block, which its islands share
   IslandModes(NewtonSolver &block, const IncrementalPotential &potential, RodSet island, Metric metric,
               std::array<Planes, 2> &work)
-      : block_(block), potential_(potential), island_(island), metric_(metric), right_(work[0]), solution_(work[1]) {}
+      : block_(block), potential_(potential), island_(island), metric_(metric), right_(work[0]), solution_(work[1]) {
+    if (circulation_.emplace(potential, std::vector{island}, block.rods()); circulation_->isNone())
+      circulation_.reset();
+  }
 
   PetscErrorCode find(int count, std::string *failure);
   /// From the lowest on.
-  std::vector<double> eigenvalues() const;
+  std::vector<std::complex<double>> eigenvalues() const;
   PetscErrorCode shape(int k, Rates *out);
   double zero() const; ///< \see Modes
 
@@ -55,7 +67,7 @@ public:
 
 private:
   struct Mode {
-    double eigenvalue;
+    double eigenvalue, imaginary;
     OwnedVec vector;
   };
   NewtonSolver &block_;
@@ -63,9 +75,14 @@ private:
   RodSet island_;
   Metric metric_;
   Planes &right_, &solution_;
-  double shift_ = 0; ///< s = -shift_, below all eigenvalues [1/s^2]
+  double shift_ = 0;                       ///< s = -shift_, below all eigenvalues [1/s^2]
+  std::optional<Circulatory> circulation_; ///< where K is not symmetric
+  bool singular_ = false;                  ///< K - s M
   std::vector<Mode> found_;
 
+  PetscErrorCode setUp(EPS eps, Mat stiffness, Mat mass, int count);
+  PetscErrorCode factorShifted();
+  PetscErrorCode balance(Mode &first, Mode &second);
   PetscErrorCode countBelow(double value, int *count) { return block_.factorWith(metric_, island_, -value, count); }
   PetscErrorCode chooseShift(int count);
   PetscErrorCode search(int count);
@@ -105,6 +122,7 @@ PetscErrorCode IslandModes::applyInverse(Vec x, Vec y) {
   watch().beat();
   PetscCall(potential_.dofs().scatter(x, island_, right_));
   PetscCall(block_.solveLinear(right_, solution_));
+  if (circulation_ && !circulation_->correct(solution_)) singular_ = true;
   PetscCall(potential_.dofs().gather(solution_, island_, y));
   PetscFunctionReturn(0);
 }
@@ -136,23 +154,25 @@ PetscErrorCode IslandModes::chooseShift(int count) {
   PetscFunctionReturn(0);
 }
 
-/// Adds so many of the lowest modes beside those that are known.
-PetscErrorCode IslandModes::search(int count) {
-  OwnedEPS eps;
-  OwnedMat stiffness, mass;
+/// K - s M, which applyInverse solves with.
+PetscErrorCode IslandModes::factorShifted() {
+  int negative;
+  PetscFunctionBeginUser;
+  PetscCall(countBelow(-shift_, &negative));
+  if (circulation_)
+    PetscCall(circulation_->update([this](const Planes &r, Planes &x) { return block_.solveLinear(r, x); }));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode IslandModes::setUp(EPS eps, Mat stiffness, Mat mass, int count) {
   ST st;
   KSP ksp;
   PC pc;
-  int negative;
   PetscFunctionBeginUser;
-  const PetscInt n = potential_.dofs().unknowns(island_);
-  PetscCall(countBelow(-shift_, &negative)); // its factor is what applyInverse solves with
-  for (OwnedMat *m : {&stiffness, &mass}) PetscCall(MatCreateShell(PETSC_COMM_SELF, n, n, n, n, this, m->out()));
   PetscCall(MatShellSetOperation(mass, MATOP_MULT, (void (*)(void))metricCallback));
   PetscCall(MatShellSetOperation(stiffness, MATOP_MULT, (void (*)(void))stiffnessCallback));
-  PetscCall(EPSCreate(PETSC_COMM_SELF, eps.out()));
   PetscCall(EPSSetOperators(eps, stiffness, mass));
-  PetscCall(EPSSetProblemType(eps, EPS_GHEP));
+  PetscCall(EPSSetProblemType(eps, circulation_ ? EPS_GNHEP : EPS_GHEP));
   PetscCall(EPSGetST(eps, &st));
   PetscCall(STSetType(st, STSINVERT));
   PetscCall(STSetMatMode(st, ST_MATMODE_SHELL)); // the factor is ours, and no matrix is formed
@@ -165,19 +185,60 @@ PetscErrorCode IslandModes::search(int count) {
   PetscCall(PCShellSetApply(pc, inverseCallback));
   PetscCall(EPSSetTarget(eps, -shift_));
   PetscCall(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE));
-  PetscCall(EPSSetDimensions(eps, count, PetscMin(n, 2 * count + 20), PETSC_DEFAULT));
+  PetscCall(EPSSetDimensions(eps, count, PetscMin(potential_.dofs().unknowns(island_), 2 * count + 20), PETSC_DEFAULT));
   PetscCall(EPSSetTolerances(eps, residual_tolerance, 200));
+  PetscFunctionReturn(0);
+}
+
+/// Of the vectors v and w of a pair of complex eigenvectors v +- i w, whose phase is free, makes those that are
+/// orthogonal by the masses, the larger one first.
+PetscErrorCode IslandModes::balance(Mode &first, Mode &second) {
+  OwnedVec moved;
+  PetscScalar vv, vw, ww;
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(first.vector, moved.out()));
+  PetscCall(applyMetric(first.vector, moved));
+  PetscCall(VecDot(first.vector, moved, &vv));
+  PetscCall(VecDot(second.vector, moved, &vw));
+  PetscCall(applyMetric(second.vector, moved));
+  PetscCall(VecDot(second.vector, moved, &ww));
+  const double phase = 0.5 * std::atan2(2 * vw, vv - ww), size = 1 / std::sqrt(vv + ww);
+  PetscCall(VecCopy(first.vector, moved)); // times exp(-i phase)
+  PetscCall(VecScale(first.vector, size * std::cos(phase)));
+  PetscCall(VecAXPY(first.vector, size * std::sin(phase), second.vector));
+  PetscCall(VecScale(second.vector, size * std::cos(phase)));
+  PetscCall(VecAXPY(second.vector, -size * std::sin(phase), moved));
+  PetscFunctionReturn(0);
+}
+
+/// Adds so many of the lowest modes beside those that are known.
+PetscErrorCode IslandModes::search(int count) {
+  OwnedEPS eps;
+  OwnedMat stiffness, mass;
+  PetscFunctionBeginUser;
+  const PetscInt n = potential_.dofs().unknowns(island_);
+  PetscCall(factorShifted());
+  for (OwnedMat *m : {&stiffness, &mass}) PetscCall(MatCreateShell(PETSC_COMM_SELF, n, n, n, n, this, m->out()));
+  PetscCall(EPSCreate(PETSC_COMM_SELF, eps.out()));
+  PetscCall(setUp(eps, stiffness, mass, count));
   std::vector<Vec> known;
   for (const Mode &m : found_) known.push_back(m.vector);
   if (!known.empty()) PetscCall(EPSSetDeflationSpace(eps, PetscInt(known.size()), known.data()));
   PetscCall(EPSSolve(eps));
   PetscInt converged;
   PetscCall(EPSGetConverged(eps, &converged));
+  if (singular_) PetscFunctionReturn(0);
   for (PetscInt k = 0; k < converged; ++k) {
-    Mode mode;
-    PetscCall(MatCreateVecs(mass, mode.vector.out(), nullptr));
-    PetscCall(EPSGetEigenpair(eps, k, &mode.eigenvalue, nullptr, mode.vector, nullptr));
+    Mode mode, partner;
+    for (Mode *m : {&mode, &partner}) PetscCall(MatCreateVecs(mass, m->vector.out(), nullptr));
+    PetscCall(EPSGetEigenpair(eps, k, &mode.eigenvalue, &mode.imaginary, mode.vector, partner.vector));
+    const bool pair = mode.imaginary != 0 && ++k < converged;
+    if (std::abs(mode.imaginary) <= complex_part * (std::abs(mode.eigenvalue) + shift_)) mode.imaginary = 0;
+    partner.eigenvalue = mode.eigenvalue;
+    partner.imaginary = -mode.imaginary;
+    if (mode.imaginary != 0) PetscCall(balance(mode, partner));
     found_.push_back(std::move(mode));
+    if (pair) found_.push_back(std::move(partner));
   }
   std::stable_sort(found_.begin(), found_.end(),
                    [](const Mode &a, const Mode &b) { return a.eigenvalue < b.eigenvalue; });
@@ -188,7 +249,7 @@ PetscErrorCode IslandModes::search(int count) {
 PetscErrorCode IslandModes::isComplete(int count, int *missing) {
   PetscFunctionBeginUser;
   *missing = std::max(0, count - int(found_.size()));
-  if (*missing > 0) PetscFunctionReturn(0);
+  if (*missing > 0 || circulation_) PetscFunctionReturn(0);
   const double last = found_[std::size_t(count) - 1].eigenvalue;
   const bool is_free = std::abs(last) <= zero(); // it may be one of many, told apart by rounding
   for (const double gap : {1e-8, 1e-7, 1e-6}) {  // beside an eigenvalue the count is rounding
@@ -216,10 +277,14 @@ PetscErrorCode IslandModes::find(int count, std::string *failure) {
     PetscCall(isComplete(count, &missing));
   }
   if (missing > 0)
-    *failure = "of " + std::to_string(count) + " modes " + std::to_string(missing) +
-               " could not be found: the inertia of the factored matrix counts more eigenvalues below the last than "
-               "there are modes; ask for another number of -modes, or take other -rod_edges";
-  found_.resize(std::min(found_.size(), std::size_t(count)));
+    *failure = "of " + std::to_string(count) + " modes " + std::to_string(missing) + " could not be found" +
+               (circulation_ ? ""
+                             : ": the inertia of the factored matrix counts more eigenvalues below the last than "
+                               "there are modes") +
+               "; ask for another number of -modes, or take other -rod_edges";
+  const std::size_t asked = std::size_t(count);
+  const bool splits = asked < found_.size() && found_[asked - 1].imaginary > 0; // what flutters is two modes
+  found_.resize(std::min(found_.size(), asked + (splits ? 1 : 0)));
   PetscFunctionReturn(0);
 }
 
@@ -234,9 +299,9 @@ double IslandModes::zero() const {
   return std::max(free_part * shift_, stretch_part * stretch);
 }
 
-std::vector<double> IslandModes::eigenvalues() const {
-  std::vector<double> values;
-  for (const Mode &m : found_) values.push_back(m.eigenvalue);
+std::vector<std::complex<double>> IslandModes::eigenvalues() const {
+  std::vector<std::complex<double>> values;
+  for (const Mode &m : found_) values.emplace_back(m.eigenvalue, m.imaginary);
   return values;
 }
 
@@ -268,7 +333,9 @@ PetscErrorCode IslandModes::shape(int k, Rates *out) {
                                         Vec3::Zero()};
   }
   if (std::abs(largest) < 1e-6 * length * std::abs(most_twisted)) largest = most_twisted; // it only twists
-  const double size = std::copysign(1 / std::sqrt(potential_.dofs().dot(island_, right_, solution_)), largest);
+  const bool flutters = found_[std::size_t(k)].imaginary != 0;                            // scaled with its partner
+  const double size =
+      flutters ? 1 : std::copysign(1 / std::sqrt(potential_.dofs().dot(island_, right_, solution_)), largest);
   for (Vec3 &v : out->vertex) v *= size;
   for (double &t : out->edge) t *= size;
   for (BodyRate &b : out->body) b = BodyRate().add(size, b);
@@ -283,7 +350,7 @@ PetscErrorCode modesAtIterate(StepSolver &solver, Metric metric, int count, Mode
   *modes = {};
   std::vector<IslandModes> islands;
   struct Place {
-    double eigenvalue;
+    std::complex<double> eigenvalue;
     std::size_t island;
     int number;
   };
@@ -297,14 +364,17 @@ PetscErrorCode modesAtIterate(StepSolver &solver, Metric metric, int count, Mode
       IslandModes &one = islands.emplace_back(block, solver.potential(), island, metric, work.back());
       PetscCall(one.find(count, failure));
       if (!failure->empty()) PetscFunctionReturn(0);
-      const std::vector<double> values = one.eigenvalues();
+      const std::vector<std::complex<double>> values = one.eigenvalues();
       for (std::size_t k = 0; k < values.size(); ++k) all.push_back({values[k], islands.size() - 1, int(k)});
     }
   }
-  std::stable_sort(all.begin(), all.end(), [](const Place &a, const Place &b) { return a.eigenvalue < b.eigenvalue; });
-  all.resize(std::min(all.size(), std::size_t(count)));
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Place &a, const Place &b) { return a.eigenvalue.real() < b.eigenvalue.real(); });
+  if (all.size() > std::size_t(count))
+    all.resize(std::size_t(count) + (all[std::size_t(count) - 1].eigenvalue.imag() > 0));
   for (const Place &p : all) {
-    modes->eigenvalue.push_back(p.eigenvalue);
+    modes->eigenvalue.push_back(p.eigenvalue.real());
+    modes->imaginary.push_back(p.eigenvalue.imag());
     modes->zero.push_back(islands[p.island].zero());
     PetscCall(islands[p.island].shape(p.number, &modes->shape.emplace_back()));
   }

@@ -38,7 +38,7 @@ void requireDeadLoads(const Scene &scene) {
                return (heavy && b.gravity) || !b.force.isZero(0) || !b.torque.isZero(0);
              });
   if (!weight && !on_bodies && scene.rotation.angular_velocity.isZero(0) && scene.forces.empty() &&
-      scene.moments.empty())
+      scene.followers.empty() && scene.moments.empty())
     throw SceneError("-continuation arclength needs a load to follow: gravity, a force, a torque or a moment");
 }
 

@@ -1,8 +1,11 @@
 #include "tendril/energy/derived.hpp"
 
 #include "tendril/energy/edge.hpp"
+#include "tendril/energy/tendon.hpp"
 #include "tendril/energy/term.hpp"
 #include "tendril/layout/same_vertices.hpp"
+
+#include <map>
 
 namespace tendril {
 namespace {
@@ -81,6 +84,32 @@ RodStrains rodStrains(const Scene &scene, const Elements &elements, const State 
   return out;
 }
 
+/// Forces of springs and tendons on vertices of rods, by their slots [N].
+static std::map<int, Vec3> forcesThatDraw(const Scene &scene, const Elements &elements, const State &state,
+                                          const Configuration &c, const std::vector<ConstraintReading> &springs,
+                                          bool dynamic) {
+  std::map<int, Vec3> sum;
+  auto add = [&](int slot, const Vec3 &force) { sum.try_emplace(slot, Vec3::Zero()).first->second += force; };
+  for (std::size_t k = 0; k < scene.constraints.size(); ++k) {
+    const Constraint &spring = scene.constraints[k];
+    if (!spring.isPin()) continue;
+    add(elements.rods[spring.rod].slot(spring.at), springs[k].force);
+    if (spring.isTie()) add(elements.rods[spring.to_rod].slot(spring.to_vertex), -springs[k].force);
+  }
+  for (int k = 0; k < int(scene.tendons.size()); ++k) {
+    const TendonPath path(scene, elements, k);
+    const TendonReading of = readTendon(scene, elements, k, state, c, dynamic);
+    const Eigen::VectorXd pull = -of.factor() * path.derivatives(c, false, of.tensions()).gradient;
+    Eigen::Index first = 0;
+    for (const Carrier &carrier : path.carriers()) {
+      for (std::size_t v = 0; v < 2 && !carrier.isBody(); ++v)
+        add(carrier.slot[v], pull.segment<3>(first + 3 * Eigen::Index(v)));
+      first += Carrier::variables;
+    }
+  }
+  return sum;
+}
+
 RodActions rodActions(const Scene &scene, const Elements &elements, const State &state, double motion_time,
                       double load_factor, bool dynamic) {
   const Configuration c = configurationOf(state, scene, elements, motion_time);
@@ -141,6 +170,7 @@ RodActions rodActions(const Scene &scene, const Elements &elements, const State 
     out.attachment.push_back(force);
     out.attachment_moment.push_back(moment);
   }
+  const std::map<int, Vec3> drawing = forcesThatDraw(scene, elements, state, c, out.constraint, dynamic);
   for (std::size_t k = 0; k < scene.supports.size(); ++k) {
     const Support &support = scene.supports[k];
     if (const int frame = elements.support_slot[k]; frame >= 0)
@@ -156,7 +186,10 @@ RodActions rodActions(const Scene &scene, const Elements &elements, const State 
       if (rod.gravity) loads += mass * scene.gravity;
       for (const int f : elements.forcesOf(r))
         if (scene.forces[f].vertex == vertex) loads += scene.forces[f].force;
+      for (const PlacedFollower &f : elements.followers({r, r + 1}))
+        if (f.vertex == elements.vertex_slot[v]) loads += f.along(c.frameAt(f.edge));
       reaction += mass * rod.material.mass_damping_coefficient * state.velocity[v] - load_factor * loads;
+      if (const auto drawn = drawing.find(elements.vertex_slot[v]); drawn != drawing.end()) reaction -= drawn->second;
       if (before >= 0) reaction += out.force[range.first_edge + before];
       if (after >= 0) reaction -= out.force[range.first_edge + after];
     });

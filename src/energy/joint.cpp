@@ -256,6 +256,29 @@ static Vec12 ratesOf(const Joint &joint, const State &state) {
   return rate;
 }
 
+Rows carryingForces(const Joint &joint, const JointPlace &place, bool of_parent, const Eigen::Vector<double, 6> &body) {
+  using UpToSix = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6>;
+  const int first = of_parent ? 6 : 0;
+  const Vec3 &arm = of_parent ? place.parent_arm : place.arm;
+  UpToSix rows(6, 6), along(6, 6);
+  std::array<int, 6> held;
+  int n = 0;
+  for (int k = 0; k < coordinate_row; ++k) {
+    if (!joint.isExact() || !holds(joint, k)) continue;
+    rows.col(n) = jointRow(joint, place, k).gradient.segment<6>(first);
+    const bool turns = k > 2;
+    const Vec3 axis = rows.col(n).segment<3>(turns ? 3 : 0).normalized();
+    along.col(n) << (turns ? Vec3(arm.cross(axis)) : axis), (turns ? axis : Vec3(Vec3::Zero()));
+    held[std::size_t(n++)] = k;
+  }
+  Rows forces = Rows::Zero();
+  if (n == 0) return forces;
+  const Eigen::MatrixXd moved = along.leftCols(n).transpose() * rows.leftCols(n);
+  const Eigen::VectorXd solved = moved.partialPivLu().solve(-along.leftCols(n).transpose() * body);
+  for (int k = 0; k < n && solved.allFinite(); ++k) forces[held[std::size_t(k)]] = solved[k];
+  return forces;
+}
+
 double tearingOf(const Scene &scene, const Elements &elements, int index, const State &state, const Configuration &c) {
   const Joint &joint = scene.joints[std::size_t(index)];
   if (joint.motion.moves()) return 0; // it begins to move with the first step

@@ -6,7 +6,7 @@
 namespace tendril {
 
 Linkage::Linkage(const Scene &scene, const Elements &elements)
-    : scene_(scene), elements_(elements), links_(scene.rods.size()), in_tree_(scene.bodies.size(), false),
+    : scene_(scene), elements_(elements), links_(scene.rods.size()), in_tree_(scene.bodies.size(), false), of_tree_(scene.joints.size(), false),
       moves_(scene.bodies.size()) {
   const int count = int(scene.bodies.size()), world = count;
   std::vector<int> first(std::size_t(count) + 1);
@@ -21,6 +21,7 @@ Linkage::Linkage(const Scene &scene, const Elements &elements)
     const int parent = j.parent < 0 ? world : j.parent, a = rootOf(j.child), b = rootOf(parent);
     if (!j.isExact() || a == b) continue;
     first[std::size_t(a)] = b;
+    of_tree_[std::size_t(k)] = true;
     joints[std::size_t(j.child)].push_back(k);
     joints[std::size_t(parent)].push_back(k);
     for (const int body : {j.child, j.parent})
@@ -68,7 +69,7 @@ static double turnAbout(const Mat3 &rotation, const Vec3 &axis) {
 
 /// With T what a body has turned by since it was drawn, a joint has T_child = T_parent exp(axis q), and the child's
 /// point as far from the parent's, in the parent's axes, as it slides.
-void Linkage::follow(const Link &link, const Configuration &from, const Planes &increment, double scale) const {
+void Linkage::follow(const TreeJoint &link, const Configuration &from, const Planes &increment, double scale) const {
   const Joint &joint = scene_.joints[std::size_t(link.joint)];
   const BodyPair &pair = elements_.pairOf(link.joint);
   const JointPlace place = placeOf(joint, pair, elements_, from);
@@ -143,7 +144,7 @@ double Linkage::correct(const Configuration &from, const Planes &increment, doub
   for (const int host : hosts_[std::size_t(r)]) {
     for (const JoinedBody &b : elements_.bodies({host, host + 1}))
       moves_[std::size_t(b.body)] = {scale * increment.vector(0, b.position), scale * increment.vector(0, b.rotation)};
-    for (const Link &link : links_[std::size_t(host)]) follow(link, from, increment, scale);
+    for (const TreeJoint &link : links_[std::size_t(host)]) follow(link, from, increment, scale);
   }
   for (const JoinedBody &b : elements_.bodies({r, r + 1})) {
     if (!in_tree_[std::size_t(b.body)]) continue;

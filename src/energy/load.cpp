@@ -1,4 +1,4 @@
-/// Gravity, centrifugal and nodal forces, and couples on edges.
+/// Gravity, centrifugal and nodal forces, follower forces, and couples on edges.
 #include "tendril/energy/load.hpp"
 
 #include "tendril/energy/work.hpp"
@@ -10,14 +10,14 @@ namespace tendril {
 namespace {
 
 /// Dead forces have the potential -F.(x - x_start). A couple does the work M.t d(theta) + M.(t x dt) along the path of
-/// the iterates; it has no potential over large rotations, so it is measured from the last iterate: all that a line
-/// search compares starts there.
+/// the iterates, a follower force F.dx; they have no potential over large rotations, so their work is measured from the
+/// last iterate: all that a line search compares starts there. The derivative of follower forces is `Circulatory`'s.
 class Load final : public Term {
 public:
   Load(const Scene &scene, const Elements &elements)
       : scene_(scene), elements_(elements), turns_(!scene.rotation.angular_velocity.isZero(0)),
         centre_(scene.rotation.centre), spin_(scene.rotation.matrix()), full_(3, elements.slots),
-        couples_(scene.rods.size()) {
+        couples_(scene.rods.size()), followers_(scene.rods.size()) {
     for (std::size_t r = 0; r < scene.rods.size(); ++r)
       if (scene.rods[r].gravity)
         for (int s = elements.rods[r].first_slot; s < elements.rods[r].vertexEnd(); ++s)
@@ -28,6 +28,8 @@ public:
     }
     for (const EdgeMoment &m : scene.moments)
       couples_[m.rod].push_back({m, elements.rods[m.rod].slot(m.edge), Vec3::Zero(), 0.0});
+    for (const PlacedFollower &f : elements.followers({0, int(scene.rods.size())}))
+      followers_[f.rod].push_back({f, Vec3::Zero(), Vec3::Zero()});
     force_ = full_;
   }
 
@@ -44,6 +46,10 @@ public:
     for (Couple &m : couples_[rod]) {
       m.tangent = iterate.frameAt(m.slot).tangent;
       m.spin = iterate[Configuration::spin][m.slot];
+    }
+    for (Follower &f : followers_[rod]) {
+      f.iterate = iterate.displacementAt(f.vertex, *start_);
+      f.acting = f.along(iterate.frameAt(f.edge));
     }
   }
 
@@ -72,6 +78,9 @@ public:
     for (const Couple &m : couples_[r])
       sum -= factor_ * coupleWork(m.moment, m.torque, m.tangent, c.frameAt(m.slot).tangent,
                                   c[Configuration::spin][m.slot] - m.spin);
+    for (const Follower &f : followers_[r])
+      sum -=
+          0.5 * factor_ * (f.acting + f.along(c.frameAt(f.edge))).dot(c.displacementAt(f.vertex, *start_) - f.iterate);
     return sum;
   }
 
@@ -106,6 +115,10 @@ public:
             addTo<Pack>(blocks.vertex(k, l) + s, -weight * Pack(spin_(k, l)));
         }
       }
+    for (const Follower &f : followers_[r]) {
+      const Vec3 force = factor_ * f.along(c.frameAt(f.edge));
+      for (int a = 0; a < 3; ++a) out.equilibrium[a][f.vertex] -= force[a];
+    }
     for (const Couple &m : couples_[r]) {
       const Frame f = c.frameAt(m.slot);
       const Vec3 pair = factor_ * m.moment.cross(f.tangent) / f.length;
@@ -124,6 +137,10 @@ private:
     Vec3 tangent; ///< at the iterate
     double spin;
   };
+  struct Follower : PlacedFollower {
+    Vec3 iterate; ///< displacement of its vertex at the iterate, from the start
+    Vec3 acting;  ///< there, at load factor 1 [N]
+  };
   const Scene &scene_;
   const Elements &elements_;
   bool turns_;
@@ -131,6 +148,7 @@ private:
   Mat3 spin_;           ///< see Scene::Rotation::matrix
   Planes full_, force_; ///< forces on vertices [N] at load factor 1, and now
   std::vector<std::vector<Couple>> couples_;
+  std::vector<std::vector<Follower>> followers_;
   const Configuration *start_ = nullptr;
   double factor_ = 1;
 
@@ -180,6 +198,7 @@ double loadScale(const Scene &scene, const Elements &elements, int r, double len
   }
   for (const auto &[vertex, f] : force)
     if (!held(vertex)) s += f.norm();
+  for (const PlacedFollower &f : elements.followers({r, r + 1})) s += f.force.norm();
   for (const int k : elements.momentsOf(r))
     s += (std::abs(scene.moments[k].torque) + scene.moments[k].moment.norm()) / length;
   return s;

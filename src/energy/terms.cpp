@@ -13,7 +13,8 @@ std::vector<std::unique_ptr<Term>> makeRodTerms(const Scene &scene, const Elemen
   if (!elements.cell_slot.empty()) terms.push_back(makeBendTwist(scene, elements));
   if (std::any_of(elements.rods.begin(), elements.rods.end(), [](const RodRange &r) { return r.isReduced(); }))
     terms.push_back(makeBend(scene, elements));
-  if (heavy || !scene.rotation.angular_velocity.isZero(0) || !scene.forces.empty() || !scene.moments.empty())
+  if (heavy || !scene.rotation.angular_velocity.isZero(0) || !scene.forces.empty() || !scene.followers.empty() ||
+      !scene.moments.empty())
     terms.push_back(makeLoad(scene, elements));
   if (dynamic) terms.push_back(makeInertia(scene, elements));
   if (!scene.bodies.empty()) terms.push_back(makeBodyMotion(scene, elements, dynamic));

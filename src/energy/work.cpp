@@ -70,6 +70,9 @@ void addWorkOfLoads(const Scene &scene, const Elements &elements, const Configur
   const double mean = 0.5 * (factor_start + factor_end);
   for (const NodalForce &f : scene.forces)
     sum.add(mean * f.force.dot(end.displacementAt(elements.rods[f.rod].slot(f.vertex), start)));
+  for (const PlacedFollower &f : elements.followers({0, int(scene.rods.size())}))
+    sum.add(0.5 * mean *
+            (f.along(start.frameAt(f.edge)) + f.along(end.frameAt(f.edge))).dot(end.displacementAt(f.vertex, start)));
   for (const EdgeMoment &m : scene.moments) {
     const int slot = elements.rods[m.rod].slot(m.edge);
     const Frame before = start.frameAt(slot), after = end.frameAt(slot);

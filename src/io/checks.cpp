@@ -162,7 +162,8 @@ void checkScene(const Scene &scene, const Options &o, std::vector<std::string> *
                      "let supports turn by their motion");
   if (o.bifurcation && o.loop.bifurcation != Bifurcation::off && scene.hasCouples())
     throw SceneError(
-        "option -bifurcation: a scene with couples has no potential whose Hessian could tell stability; use off");
+        "option -bifurcation: a scene with couples or follower forces has no potential whose Hessian could tell "
+        "stability; use off");
   if (!o.loop.dynamic && o.loop.continuation == Continuation::arclength) requireDeadLoads(scene);
   for (const Constraint &c : scene.constraints)
     if (!c.isPin() && (o.accuracy || (o.error_estimate && !o.loop.dynamic)))

@@ -85,14 +85,18 @@ void place(Scene &scene, std::vector<Drawing> &drawings, const Mat3 &rotation, c
 }
 
 /// What forces act in a mechanism, about: its residuals are told by it where nothing has weight [N].
-static double forceOf(const Scene &scene, const Body &body, double size) {
-  double force = body.own.mass * scene.gravity.norm() + body.force.norm() + body.torque.norm() / size;
+static double forceOf(const Scene &scene, const std::vector<const Body *> &bodies, double size) {
+  double force = 0, mass = 0;
+  for (const Body *body : bodies) {
+    mass += body->own.mass;
+    force += body->own.mass * scene.gravity.norm() + body->force.norm() + body->torque.norm() / size;
+  }
   for (const Joint &j : scene.joints) force = std::max(force, j.drive_stiffness / size);
   for (const Tendon &t : scene.tendons)
     if (t.actuator.kind == Actuator::Kind::force) force = std::max(force, t.actuator.largestInput());
   for (const Tendon &t : scene.tendons) // where nothing else is known
     if (force == 0) force = 1e-6 * size * stiffnessAsDrawn(t);
-  return force > 0 ? force : body.own.mass * size;
+  return force > 0 ? force : mass * size;
 }
 
 void carryBodies(SceneFile &out) {
@@ -138,12 +142,18 @@ void carryBodies(SceneFile &out) {
     if (has_rod[root] || !(joined[root] || alone)) continue;
     if (carrier[root] < 0) {
       const Body &body = scene.bodies[root];
-      const double size = std::sqrt(body.own.inertia.trace() / body.own.mass);
+      double size = std::sqrt(body.own.inertia.trace() / body.own.mass); // of the mechanism, and its mass
+      std::vector<const Body *> all;
+      for (std::size_t k = b; k < count; ++k)
+        if (std::size_t(rootOf(int(k))) == root) {
+          all.push_back(&scene.bodies[k]);
+          size = std::max(size, (all.back()->position - body.position).norm());
+        }
       Rod rod;
       rod.name = "carrier of " + body.name;
       while (out.names.isTaken(rod.name)) rod.name += "'";
       rod.position = {body.position, body.position + Vec3(size, 0, 0)};
-      rod.material = {1e-9 * body.own.mass / size, 0, 1e4 * forceOf(scene, body, size), 0, {0, 0}, 0, 0};
+      rod.material = {1e-9 * body.own.mass / size, 0, 1e4 * forceOf(scene, all, size), 0, {0, 0}, 0, 0};
       rod.gravity = false;
       rod.contact.on = false;
       setBishopDirectors(rod);
@@ -235,6 +245,7 @@ void append(SceneFile part, const std::string &prefix, const YamlValue &where, S
       if (other.name == t.name) clash("a tendon", t.name);
   }
   for (NodalForce &f : from.forces) f.rod += rods;
+  for (FollowerForce &f : from.followers) f.rod += rods;
   for (EdgeMoment &m : from.moments) m.rod += rods;
   for (Collider &c : from.colliders) {
     named(c.name);
@@ -267,6 +278,7 @@ void append(SceneFile part, const std::string &prefix, const YamlValue &where, S
   add(scene.joints, from.joints);
   add(scene.tendons, from.tendons);
   add(scene.forces, from.forces);
+  add(scene.followers, from.followers);
   add(scene.moments, from.moments);
   add(scene.colliders, from.colliders);
   add(out.drawings, part.drawings);

@@ -185,7 +185,7 @@ std::string rulesOf(std::string_view block) {
     return R"("oneOf": [
  {"required": ["vertex"], "anyOf": [{"required": ["force"]}, {"required": ["mass"]}], "not": {"anyOf": [{"required": ["edge"]}, {"required": ["torque"]}, {"required": ["moment"]}]}},
  {"required": ["edge"], "anyOf": [{"required": ["torque"]}, {"required": ["moment"]}],
-  "not": {"anyOf": [{"required": ["vertex"]}, {"required": ["force"]}]}}])";
+  "not": {"anyOf": [{"required": ["vertex"]}, {"required": ["force"]}]}}], "dependencies": {"axes": ["force"]})";
   return {};
 }
 

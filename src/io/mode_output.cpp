@@ -16,17 +16,22 @@ namespace {
   throw SceneError(std::string("option -mode ") + (buckling ? "buckling: " : "modes: ") + what);
 }
 
-/// Loads and contact that have no potential: their modes would be those of a matrix that is not symmetric.
+/// Loads and contact that have no potential. Natural frequencies with friction would be those of what sticks.
 void refuseUnsymmetric(const Scene &scene, bool buckling) {
   auto refuse = [&](const std::string &what) { tendril::refuse(buckling, what); };
-  const std::string unsymmetric = " has no potential, and a problem that is not symmetric is not supported yet; ",
-                    friction = "friction" + unsymmetric + "write 'contact: {friction: 0}'";
-  for (const EdgeMoment &m : scene.moments)
-    refuse("the " + std::string(m.moment.isZero(0) ? "'torque'" : "'moment'") + " on edge " + std::to_string(m.edge) +
-           " of " + labelOf(scene.rods[std::size_t(m.rod)]) + unsymmetric + "turn a clamp in its place");
-  for (const Body &b : scene.bodies)
-    if (!b.torque.isZero(0))
-      refuse("the 'torque' on body '" + b.name + "'" + unsymmetric + "turn a joint in its place");
+  const std::string unsymmetric = " has no potential, and ",
+                    friction = "friction" + unsymmetric + "what sticks may slide; write 'contact: {friction: 0}'";
+  if (buckling) {
+    constexpr const char *flutter = "the scene may flutter before it buckles; take -mode modes";
+    for (const FollowerForce &f : scene.followers)
+      refuse("the force of 'axes: material' on vertex " + std::to_string(f.vertex) + " of " +
+             labelOf(scene.rods[std::size_t(f.rod)]) + unsymmetric + flutter);
+    for (const EdgeMoment &m : scene.moments)
+      refuse("the " + std::string(m.moment.isZero(0) ? "'torque'" : "'moment'") + " on edge " + std::to_string(m.edge) +
+             " of " + labelOf(scene.rods[std::size_t(m.rod)]) + unsymmetric + flutter);
+    for (const Body &b : scene.bodies)
+      if (!b.torque.isZero(0)) refuse("the 'torque' on body '" + b.name + "'" + unsymmetric + flutter);
+  }
   const bool touch = !scene.colliders.empty();
   for (const Rod &rod : scene.rods)
     if (rod.contact.on && rod.contact.friction > 0 && (touch || rod.contact.touchesMoving()))
@@ -39,7 +44,11 @@ void refuseUnsymmetric(const Scene &scene, bool buckling) {
 std::string lineOf(const Modes &modes, int k) {
   std::ostringstream line;
   line << "mode " << k + 1 << ": " << std::setprecision(10);
-  if (modes.isUnstable(k))
+  if (modes.flutters(k))
+    line << "flutters with " << modes.frequency(k) << " rad/s, "
+         << (modes.imaginary[std::size_t(k)] > 0 ? "grows as exp(" : "and its partner: exp(+-") << modes.growthRate(k)
+         << "/s t)";
+  else if (modes.isUnstable(k))
     line << "unstable, grows as exp(" << modes.growthRate(k) << "/s t)";
   else if (modes.isFree(k))
     line << "0 rad/s, a motion that costs nothing";
@@ -145,8 +154,9 @@ void refuseTooManyModes(const Simulation &run, const Options &o) {
 bool isAlone(const Scene &scene) {
   return std::none_of(scene.supports.begin(), scene.supports.end(),
                       [](const Support &s) { return s.holdsPosition(); }) &&
-         scene.gravity.isZero(0) && scene.forces.empty() && scene.moments.empty() && scene.tendons.empty() &&
-         scene.constraints.empty() && scene.joints.empty() && scene.colliders.empty() && !scene.touchesMoving() &&
+         scene.gravity.isZero(0) && scene.forces.empty() && scene.followers.empty() && scene.moments.empty() &&
+         scene.tendons.empty() && scene.constraints.empty() && scene.joints.empty() && scene.colliders.empty() &&
+         !scene.touchesMoving() &&
          std::all_of(scene.bodies.begin(), scene.bodies.end(), [](const Body &b) { return b.force.isZero(0); });
 }
 

@@ -82,14 +82,17 @@ PetscErrorCode Recorder::observe(const State &state, const Diagnostics &row) {
 void Recorder::tellInstability(const Diagnostics &row) {
   const std::string count =
       std::to_string(row.negative_pivots) + (row.negative_pivots == 1 ? " negative pivot" : " negative pivots");
-  const std::string unknown = !run_.scene.moments.empty() ? "couples" : run_.scene.hasFriction() ? "friction" : "";
+  const std::string unknown = !run_.scene.followers.empty() ? "follower forces"
+                              : !run_.scene.moments.empty() ? "couples"
+                              : run_.scene.hasFriction()    ? "friction"
+                                                            : "";
   progress_.say(unknown.empty()
                     ? "at load factor " + shortText(row.time) +
                           " the path is unstable, as it is wherever negative_pivots in the diagnostics is "
                           "not 0: " +
                           count
                     : "warning: " + count + " at an accepted state with " + unknown + ": " + unknown +
-                          (unknown == "couples" ? " have" : " has") + " no potential, so its stability is not known");
+                          (unknown == "friction" ? " has" : " have") + " no potential, so its stability is not known");
   told_unstable_ = true;
 }
 

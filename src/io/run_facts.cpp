@@ -365,6 +365,8 @@ RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::
   for (const NodalForce &f : scene.forces)
     if (f.mass > 0) add(Kind::scene, at("mass on vertex ", f.vertex, f.rod), textOf(f.mass));
   for (const NodalForce &f : scene.forces) add(Kind::load, at("force on vertex ", f.vertex, f.rod), textOf(f.force));
+  for (const FollowerForce &f : scene.followers)
+    add(Kind::load, at("follower force on vertex ", f.vertex, f.rod), textOf(f.force));
   for (const EdgeMoment &m : scene.moments) {
     if (m.torque != 0) add(Kind::load, at("torque on edge ", m.edge, m.rod), textOf(m.torque));
     if (!m.moment.isZero(0)) add(Kind::load, at("moment on edge ", m.edge, m.rod), textOf(m.moment));

@@ -162,6 +162,22 @@ void readSupport(const YamlValue &value, SceneFile &out) {
   map.finish();
 }
 
+/// Takes the force of a load that turns with its rod away from it.
+static bool readFollower(YamlMap &map, const Rod &rod, NodalForce &load, Scene &scene) {
+  if (!map.has("loads[].axes") || map.word("loads[].axes") == "world") return false;
+  if (!map.has("loads[].force")) map.at("loads[].axes").fail("'axes' are those of a 'force'; write one");
+  const FollowerForce follower{load.rod, load.vertex, std::exchange(load.force, Vec3::Zero())};
+  if (rod.material.isCable() && !follower.isTangential())
+    map.at("loads[].force")
+        .fail("rod '" + rod.name +
+              "' has no flexural stiffness, and so no directors that a force could turn with; "
+              "write 'force: [0, 0, " +
+              shortText(follower.force[2]) + "]', along its tangent, or 'axes: world'");
+  if (follower.force.isZero(0)) return false;
+  scene.followers.push_back(follower);
+  return true;
+}
+
 void readLoad(const YamlValue &value, SceneFile &out) {
   Scene &scene = out.scene;
   YamlMap map(value, "loads");
@@ -169,18 +185,19 @@ void readLoad(const YamlValue &value, SceneFile &out) {
   for (const int r : readTargets(map, "loads[].rod", out.names)) {
     const Rod &rod = scene.rods[r];
     if (map.has("loads[].force") || map.has("loads[].mass")) {
-      NodalForce &load =
-          scene.forces.emplace_back(r, readIndex(map, "loads[].vertex", rod.vertices(), rod.name), Vec3::Zero());
+      NodalForce load{r, readIndex(map, "loads[].vertex", rod.vertices(), rod.name), Vec3::Zero()};
       if (map.has("loads[].force")) load.force = map.vector("loads[].force");
       if (map.has("loads[].mass")) load.mass = map.number("loads[].mass");
+      const bool follows = readFollower(map, rod, load, scene);
       const auto at = out.supports_at.find({r, load.vertex});
       const bool held = at != out.supports_at.end() && std::any_of(at->second.begin(), at->second.end(), [&](int k) {
                           return scene.supports[k].holdsPosition();
                         });
-      if (held && !warned && !load.force.isZero(0))
+      if (held && !warned && (follows || !load.force.isZero(0)))
         out.notes.push_back("warning: " + value.place() + ": the force acts on vertex " + std::to_string(load.vertex) +
                             " of rod '" + rod.name + "', which a support holds: it moves nothing");
       warned = warned || held;
+      if (!follows || load.mass > 0) scene.forces.push_back(load);
     } else if (map.has("loads[].torque") || map.has("loads[].moment")) {
       if (rod.material.isCable())
         value.fail("rod '" + rod.name + "' has no flexural stiffness: it cannot carry a torque or moment");

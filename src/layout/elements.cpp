@@ -222,8 +222,22 @@ Elements::Elements(const Scene &scene, const DofMap &dofs)
     }
     rod_cells.push_back(int(cell_slot.size()));
   }
+  placeFollowers(scene);
   if (!scene.constraints.empty()) placeConstraints(scene, std::move(free_slots));
   weighBodies(scene);
+}
+
+void Elements::placeFollowers(const Scene &scene) {
+  if (scene.followers.empty()) return;
+  for (const FollowerForce &f : scene.followers) {
+    const Rod &rod = scene.rods[f.rod];
+    const int before = rod.edgeBefore(f.vertex), after = rod.edgeAfter(f.vertex);
+    for (const int edge : {before, after})
+      if (edge >= 0)
+        followers_.items.push_back({f.rod, rods[f.rod].slot(f.vertex), rods[f.rod].slot(edge),
+                                    (before >= 0 && after >= 0 ? 0.5 : 1) * f.force});
+  }
+  followers_.sort(scene.rods.size());
 }
 
 /// The mass of a vertex that is a point of a body is a part of the body.

@@ -18,6 +18,8 @@ bool same(const NodalForce &a, const NodalForce &b) {
   return a.vertex == b.vertex && a.force == b.force && a.mass == b.mass;
 }
 
+bool same(const FollowerForce &a, const FollowerForce &b) { return a.vertex == b.vertex && a.force == b.force; }
+
 bool same(const EdgeMoment &a, const EdgeMoment &b) {
   return a.edge == b.edge && a.torque == b.torque && a.moment == b.moment;
 }
@@ -67,6 +69,7 @@ std::vector<int> firstAlike(const Scene &scene, const std::vector<Drawing> &draw
   const auto supports = byRod(scene.supports, rods);
   const auto constraints = byRod(scene.constraints, rods);
   const auto forces = byRod(scene.forces, rods);
+  const auto followers = byRod(scene.followers, rods);
   const auto moments = byRod(scene.moments, rods);
   auto alike = [&](int r, int s) {
     const Rod &a = scene.rods[r], &b = scene.rods[s];
@@ -74,7 +77,7 @@ std::vector<int> firstAlike(const Scene &scene, const std::vector<Drawing> &draw
            a.natural == b.natural && a.natural_strain == b.natural_strain && a.initial_velocity == b.initial_velocity &&
            a.initial_turns == b.initial_turns && sameShape(a, drawings[r], b, drawings[s]) &&
            sameList(supports[r], supports[s]) && sameList(constraints[r], constraints[s]) &&
-           sameList(forces[r], forces[s]) && sameList(moments[r], moments[s]);
+           sameList(forces[r], forces[s]) && sameList(followers[r], followers[s]) && sameList(moments[r], moments[s]);
   };
   std::vector<int> first, kinds;
   for (int s = 0; s < int(rods); ++s) {

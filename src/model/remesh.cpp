@@ -164,6 +164,7 @@ std::vector<int> namedVertices(const Scene &scene, int r) {
     for (const Junction::Member &m : j.members) add(m.rod, m.vertex);
   for (const Attachment &a : scene.attachments) add(a.rod, a.vertex);
   for (const NodalForce &f : scene.forces) add(f.rod, f.vertex);
+  for (const FollowerForce &f : scene.followers) add(f.rod, f.vertex);
   return named;
 }
 
@@ -358,6 +359,9 @@ Scene remesh(const Scene &written, const std::vector<Drawing> &drawings, const s
   for (const NodalForce &f : written.forces)
     scene.forces.push_back(
         {f.rod, movedVertex(written.rods[f.rod], drawings[f.rod], f.vertex, edges[f.rod]), f.force, f.mass});
+  for (const FollowerForce &f : written.followers)
+    scene.followers.push_back(
+        {f.rod, movedVertex(written.rods[f.rod], drawings[f.rod], f.vertex, edges[f.rod]), f.force});
   for (const EdgeMoment &m : written.moments) addCouple(written, drawings[m.rod], m, edges[m.rod], scene.moments);
   return scene;
 }

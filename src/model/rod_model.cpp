@@ -34,8 +34,8 @@ public:
   /// \param dynamic whether inertia counts
   Judge(const Scene &scene, bool dynamic)
       : scene_(scene), dynamic_(dynamic), supports_(scene.supports, scene.rods.size()),
-        forces_(scene.forces, scene.rods.size()), moments_(scene.moments, scene.rods.size()),
-        joined_(scene.rods.size()), turned_(scene.rods.size()) {
+        forces_(scene.forces, scene.rods.size()), followers_(scene.followers, scene.rods.size()),
+        moments_(scene.moments, scene.rods.size()), joined_(scene.rods.size()), turned_(scene.rods.size()) {
     noteJoined();
   }
   /// Why a model would leave out what acts on a rod, or what it answers with, as the end of a sentence; empty where its
@@ -50,7 +50,7 @@ public:
 private:
   const Scene &scene_;
   bool dynamic_;
-  NumbersByRod supports_, forces_, moments_;
+  NumbersByRod supports_, forces_, followers_, moments_;
   /// By rod: what joins it to others, and what turns its edges; empty where nothing does.
   std::vector<std::string> joined_, turned_;
   std::map<int, std::vector<const Constraint *>> pins_; ///< by rod: those to the world ...
@@ -148,6 +148,14 @@ std::string Judge::whatLeaves(int r, int flat) const {
   if (!isNormalTo(rod.initial_velocity, flat)) return "its velocity at the start leaves its plane";
   for (const int k : forces_.of(r))
     if (!isNormalTo(scene_.forces[std::size_t(k)].force, flat)) return "a force points out of its plane";
+  for (const int k : followers_.of(r)) {
+    const FollowerForce &f = scene_.followers[std::size_t(k)];
+    const int edge = std::min(f.vertex, rod.edges() - 1); // directors of planar rods stand at one angle to the plane
+    if (std::abs(
+            partsAlong(flat, rod.edge(edge).normalized(), rod.director[std::size_t(edge)]).dot(f.force.head<2>())) >
+        rounding * f.force.norm())
+      return "a follower force points out of its plane";
+  }
   for (const int k : moments_.of(r)) {
     const EdgeMoment &m = scene_.moments[std::size_t(k)];
     if (m.torque != 0) return "a torque twists it";
@@ -263,6 +271,8 @@ std::string Judge::whyNotTorsionFree(int r) const {
   for (const int k : moments_.of(r))
     if (scene_.moments[std::size_t(k)].torque != 0 || !scene_.moments[std::size_t(k)].moment.isZero(0))
       return "a moment or torque twists it";
+  for (const int k : followers_.of(r))
+    if (!scene_.followers[std::size_t(k)].isTangential()) return "a follower force turns with its directors";
   int holders = 0;
   for (const int k : supports_.of(r)) {
     const Support &s = scene_.supports[std::size_t(k)];
@@ -284,7 +294,8 @@ std::string Judge::whyNotTorsionFree(int r) const {
 
 std::string Judge::whyNotWatched(int r, bool watched) const {
   if (!watched) return "planes are watched on one rank, and not along the arc length of a path";
-  if (!moments_.of(r).empty()) return "moments have no potential that would tell whether it leaves its plane";
+  if (!moments_.of(r).empty() || !followers_.of(r).empty())
+    return "moments and follower forces have no potential that would tell whether it leaves its plane";
   return {};
 }
 

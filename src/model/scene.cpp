@@ -112,6 +112,7 @@ Scene withRods(const Scene &scene, const std::vector<int> &rods) {
   }
   out.hostBodies();
   keep(scene.forces, place, out.forces);
+  keep(scene.followers, place, out.followers);
   keep(scene.moments, place, out.moments);
   return out;
 }
@@ -322,7 +323,7 @@ bool Scene::isPressed(int body) const {
 
 bool Scene::hasCouples() const {
   if (whole) return whole->has_couples;
-  return !moments.empty() ||
+  return !moments.empty() || !followers.empty() ||
          std::any_of(bodies.begin(), bodies.end(), [](const Body &b) { return !b.torque.isZero(0); });
 }
 

@@ -27,6 +27,8 @@ std::vector<int> keptVertices(const IncrementalPotential &fine, int r) {
     if (c.rod == r && c.isPin()) stays[c.at] = true;
   for (const NodalForce &f : scene.forces)
     if (f.rod == r) stays[f.vertex] = true;
+  for (const FollowerForce &f : scene.followers)
+    if (f.rod == r) stays[f.vertex] = true;
   auto between = [](const Frame &a, const Frame &b) {
     return std::acos(std::clamp(a.tangent.dot(b.tangent), -1.0, 1.0)) + std::abs(halfAngleBetween(a, b).angle());
   };
@@ -105,6 +107,8 @@ struct Coarse {
       }
     for (const NodalForce &f : from.forces)
       if (isHere(f.rod)) scene.forces.push_back({f.rod - rods.begin, at(f.rod, f.vertex), f.force, f.mass});
+    for (const FollowerForce &f : from.followers)
+      if (isHere(f.rod)) scene.followers.push_back({f.rod - rods.begin, at(f.rod, f.vertex), f.force});
     for (const EdgeMoment &m : from.moments)
       if (isHere(m.rod)) scene.moments.push_back({m.rod - rods.begin, at(m.rod, m.edge), m.torque, m.moment});
   }

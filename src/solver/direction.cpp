@@ -60,10 +60,15 @@ double NewtonSolver::firstShift(int r) const {
   return stiffness / (m.linear_density * length * length);
 }
 
+/// With the masses of bodies that no rod holds by a tie: a mechanism on a rod is as heavy as all of it.
 double NewtonSolver::firstShift(RodSet island) const {
-  double least = HUGE_VAL;
-  for (int r = island.begin; r < island.end; ++r) least = std::min(least, firstShift(r));
-  return least;
+  double least = HUGE_VAL, of_rods = 0, of_bodies = 0;
+  for (int r = island.begin; r < island.end; ++r) {
+    least = std::min(least, firstShift(r));
+    of_rods += potential_->scene().rods[r].material.linear_density * potential_->length(r);
+  }
+  for (const JoinedBody &b : potential_->elements().bodies(island)) of_bodies += work_->metric.vector(0, b.position)[0];
+  return least * of_rods / (of_rods + of_bodies);
 }
 
 /// Adds multiples of the metric to the indefinite Hessians until all pivots are positive, so that the step goes
@@ -155,7 +160,7 @@ PetscErrorCode NewtonSolver::findIndefinite(Vec y, bool regular, bool *any) {
 /// Direction for an indefinite Hessian. A few negative pivots mean a state near a branching: a shifted diagonal keeps
 /// most of Newton's speed there. Many mean compressed edges: then their compression is left out of the Hessian, and the
 /// diagonal shifted only if that is not enough. In statics an equilibrium of couples need not be a minimum of anything:
-/// there Newton's own direction stands.
+/// near one Newton's own direction stands.
 PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
   constexpr int few = 2;          // the first two buckling modes, in each plane
   constexpr double longest = 0.1; // of the rod's length
@@ -163,7 +168,7 @@ PetscErrorCode NewtonSolver::makeDescent(Vec f, Vec y, bool regular) {
   if (regular && circulatory_ && potential_->step().isStatic()) {
     bool any = false;
     for (const RodSet island : islands_) {
-      if (circulatory_->acts(island)) fill(work_->indefinite, island, false);
+      if (circulates(island)) fill(work_->indefinite, island, false);
       any = any || work_->indefinite[island.begin];
     }
     if (!any) PetscFunctionReturn(0);
@@ -235,6 +240,17 @@ PetscErrorCode NewtonSolver::includeMotion(Vec y) {
   PetscCall(SNESGetKSP(snes_, &ksp));
   PetscCall(KSPSolve(ksp, right_, y));
   PetscFunctionReturn(0);
+}
+
+/// Whether an island comes to an equilibrium that need not be a minimum of anything, for couples or follower forces
+/// act on it. Farther from it than follower forces are large, which have nothing in the matrix, the way down leads
+/// nearer.
+bool NewtonSolver::circulates(RodSet island) const {
+  constexpr double near = 2; // out of balance, over the load
+  if (!potential_->step().isStatic() || !circulatory_ || !circulatory_->acts(island)) return false;
+  if (potential_->elements().followers(island).empty()) return true;
+  return std::all_of(work_->residual.begin() + island.begin, work_->residual.begin() + island.end,
+                     [](const Residual &r) { return std::max(r.force, r.moment) <= near; });
 }
 
 /// Newton direction of the whole derivative, couples included, from that of its symmetric part, in work_->increment.

@@ -16,8 +16,8 @@ const IncrementalPotential::RodEnergy &NewtonSolver::energyAtIterate(int r) {
   return work_->energy[r];
 }
 
-/// Whether the residual of an island has fallen enough at the trial.
-bool NewtonSolver::residualFalls(RodSet island, double length) {
+/// Whether the residual of an island has fallen enough at the trial, or is at most so many times what it was.
+bool NewtonSolver::residualFalls(RodSet island, double length, double most) {
   constexpr double sufficient = 1e-4;
   Configuration &kept = work_->kept;
   if (kept.empty()) kept = potential_->iterate();
@@ -36,7 +36,7 @@ bool NewtonSolver::residualFalls(RodSet island, double length) {
     size_before = std::hypot(size_before, std::hypot(before.force, before.moment));
   }
   for (int r = island.begin; r < island.end; ++r) potential_->accept(kept, r);
-  return finite && (size <= (1 - sufficient * length) * size_before || answer);
+  return finite && (size <= most * (1 - sufficient * length) * size_before || answer);
 }
 
 /// Trial of joined rods at a length of their increment. Going straight, edges get longer by squares, which stiff ones
@@ -111,7 +111,9 @@ NewtonSolver::Length NewtonSolver::judgeLength(RodSet island, double length, con
   constexpr double sufficient = 1e-4;
   if (!std::isfinite(there.value)) return Length::too_long;
   // Supports that move do work: the energy may rise with them, and only has to be finite.
-  if (work_->moving[island.begin] || d.free) return Length::good;
+  if (work_->moving[island.begin] || (d.free && !d.circulates)) return Length::good;
+  constexpr double rise = 4; // on the way of full steps to an equilibrium that minimises nothing
+  if (d.free) return residualFalls(island, length, rise) ? Length::good : Length::too_long;
   const LineSearchKind kind = potential_->settings.line_search;
   if (kind == LineSearchKind::residual) return residualFalls(island, length) ? Length::good : Length::too_long;
   if (!(there.value <= d.before.value + sufficient * length * d.slope + d.before.noise)) return Length::too_long;
@@ -199,8 +201,9 @@ bool NewtonSolver::search(RodSet island, double *lambda) {
   if (!std::isfinite(d.slope)) return false;
   d.before = {0, 0};
   // Where the symmetric part is indefinite, couples have nothing that an equilibrium would minimise.
-  d.free = seek_ == Seek::equilibrium || (potential_->step().isStatic() && circulatory_ && circulatory_->acts(island) &&
-                                          work_->negative[island.begin] > 0);
+  const bool circulates = work_->negative[island.begin] > 0 && this->circulates(island);
+  d.free = seek_ == Seek::equilibrium || circulates;
+  d.circulates = circulates && !potential_->elements().followers(island).empty();
   for (int r = island.begin; r < island.end; ++r) {
     const RodRange &rod = potential_->elements().rods[r];
     Standstill &standstill = work_->standstill[r];
@@ -232,6 +235,7 @@ bool NewtonSolver::search(RodSet island, double *lambda) {
     work_->energy[r] = work_->tried[r];
     work_->energy_known[r] = potential_->hasPotential(); // the work of couples is counted from the iterate
   }
+  potential_->carryTrees(island);
   return true;
 }
 

@@ -26,6 +26,16 @@ void IncrementalPotential::setAxialForces(int r, const double *force) {
   known(r) = Known::nothing;
 }
 
+void IncrementalPotential::carryTrees(RodSet island) {
+  bool any = false;
+  for (int r = island.begin; r < island.end && step_.isStatic(); ++r) {
+    if (linkage_.trees(r).empty()) continue;
+    const Planes &out_of_balance = gradient(r).equilibrium;
+    for (const auto &term : terms_) any = term->carry(r, out_of_balance, iterate_) || any;
+  }
+  if (any) known(island.begin) = Known::nothing;
+}
+
 bool IncrementalPotential::tryMove(const Planes &increment, double scale, int r, RetractionKind kind,
                                    Configuration &trial, double *free) {
   if (trial.empty()) trial = iterate_;

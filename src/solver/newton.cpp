@@ -250,6 +250,7 @@ PetscErrorCode NewtonSolver::newton(std::string *failure) {
   fill(work_->load_reach, std::nan(""));
   age_ = 0;
   lost_.clear();
+  for (const RodSet island : islands_) potential_->carryTrees(island);
   PetscCall(writeIterate(x_));
   // From a saddle the way down may be long, and shorter load steps begin at the same one; of fine rods they are still
   // the cheaper way.

@@ -91,7 +91,7 @@ PetscErrorCode NewtonSolver::setUp(IncrementalPotential &potential, NewtonWork &
       break;
     } else
       islands_.push_back({r, r + 1});
-  if (circulatory_.emplace(potential, islands_); circulatory_->isNone()) circulatory_.reset();
+  if (circulatory_.emplace(potential, islands_, rods_); circulatory_->isNone()) circulatory_.reset();
   system_ = {&dofs,        set,         &potential.blocks(), &work.metric,
              &work.active, &work.shift, &work.workspace,     potential.couplesPositions()};
   PetscCall(createSnes());

@@ -57,19 +57,6 @@ double NewtonSolver::normaliseMode() {
   return std::sqrt(mass);
 }
 
-/// How far the mode in work_->increment turns the edge of a rod that it turns most [rad].
-double NewtonSolver::turningOf(int r) const {
-  const Elements &e = potential_->elements();
-  double turning = 0;
-  for (int s = e.rods[r].first_slot; s < e.rods[r].edgeEnd(); ++s) {
-    for (int a = 0; a < 3; ++a)
-      turning =
-          std::max(turning, std::abs(work_->increment[a][s + 1] - work_->increment[a][s]) * e.inverseRestLength()[s]);
-    turning = std::max(turning, std::abs(work_->increment[3][s]));
-  }
-  return turning;
-}
-
 /// Bisection of the lift on the inertia, then inverse iteration beside the eigenvalue found: motions that cost nothing
 /// have another one, if only by little.
 PetscErrorCode NewtonSolver::criticalMode(int stable, double *lift, Planes *mode) {

@@ -42,6 +42,22 @@ double NewtonSolver::sizeOf(int r, const Planes &increment) const {
   return std::sqrt(positions / (length * length * places) + twists / rod.edges);
 }
 
+/// How far the mode in work_->increment turns the edge of a rod, or the body beside it, that it turns most [rad].
+double NewtonSolver::turningOf(int r) const {
+  const Elements &e = potential_->elements();
+  double turning = 0;
+  for (int s = e.rods[r].first_slot; s < e.rods[r].edgeEnd(); ++s) {
+    for (int a = 0; a < 3; ++a)
+      turning =
+          std::max(turning, std::abs(work_->increment[a][s + 1] - work_->increment[a][s]) * e.inverseRestLength()[s]);
+    turning = std::max(turning, std::abs(work_->increment[3][s]));
+  }
+  for (const JoinedBody &b : e.bodies({r, r + 1}))
+    turning = std::max({turning, work_->increment.vector(0, b.rotation).norm(),
+                        work_->increment.vector(0, b.position).norm() / e.bodySize(b.body)});
+  return turning;
+}
+
 /// What the step has moved the vertices of a rod by so far, as sizeOf, less the mean of them all: a rod that flies has
 /// not moved for that.
 double NewtonSolver::movedBy(int r) const {

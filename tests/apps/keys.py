@@ -73,7 +73,7 @@ def exampleScene(path, value):
             put(scene, f"{material}.{other}", yaml.safe_load(keys[f"{material}.{other}"]["example"]))
         if name in ("shear", "young", "poisson", "density"):
             put(scene, f"{material}.radius", 0.01)
-    if path.startswith("loads[]") and name in ("vertex", "rod"):
+    if path.startswith("loads[]") and name in ("vertex", "rod", "axes"):
         put(scene, "loads[].force", [0, 0, 1e-3])
     if path == "loads[].edge":
         put(scene, "loads[].torque", 1e-4)

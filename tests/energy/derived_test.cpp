@@ -244,6 +244,46 @@ TEST(Reaction, OfAllSupportsIsTheLoad) {
   EXPECT_LT((reaction[0] + reaction[2] + Vec3(0, -3 - 0.5, 2.5)).norm(), 10 * exact);
 }
 
+/// Springs, tendons and follower forces that end at held vertices count; a tendon within the rod takes nothing away.
+TEST(Reaction, BearsWhatDrawsAtHeldVertices) {
+  Scene scene = clampedScene(softRod(12, Measure::angle));
+  scene.supports.push_back(hold(scene, 0, 8, Support::Kind::pin));
+  scene.constraints = {pinTo(scene, 0, 0, Vec3(0.1, 0.2, 0), 5), pinTo(scene, 0, 10, Vec3(0, 0.1, 0.1), 3)};
+  Constraint tie = constraintOn(0, 8, Constraint::Kind::pin, 2);
+  tie.to_rod = 0;
+  tie.to_vertex = 3;
+  scene.constraints.push_back(tie);
+  scene.followers = {{0, 8, Vec3(0.3, -0.2, 0.5)}};
+  auto ofVertex = [](int vertex) {
+    Waypoint p;
+    p.rod = 0;
+    p.setVertex(vertex, 12);
+    return p;
+  };
+  Waypoint world;
+  world.point = Vec3(-0.4, -1, 0.3);
+  for (const bool inside : {false, true}) {
+    Tendon t;
+    t.name = inside ? "inside" : "outside";
+    t.points = {inside ? ofVertex(12) : world, ofVertex(0)};
+    t.segments = {{0, 1}};
+    t.actuator.kind = Actuator::Kind::force;
+    t.actuator.input = 0.7;
+    scene.tendons.push_back(t);
+  }
+  Simulation sim;
+  solve(sim, scene);
+  const RodActions actions = actionsOf(sim);
+  const Vec3 drawn = 0.7 * (world.point - sim.state.position[0]).normalized();
+  const Frame before = configurationOf(sim.state, sim.scene, *sim.elements, 1).frameAt(sim.elements->rods[0].slot(7)),
+              after = configurationOf(sim.state, sim.scene, *sim.elements, 1).frameAt(sim.elements->rods[0].slot(8));
+  Vec3 sum =
+      actions.reaction[0] + actions.reaction[1] + actions.constraint[0].force + actions.constraint[1].force + drawn;
+  for (const PlacedFollower &f : sim.elements->followers({0, 1}))
+    sum += f.along(f.edge == sim.elements->rods[0].slot(7) ? before : after);
+  EXPECT_LT(sum.norm(), 10 * exact);
+}
+
 /// Force and moment of the whole rod: what supports do, loads on held vertices, weights and couples sum to nothing,
 /// about the origin too.
 TEST(ReactionMoment, BalancesTheWholeRod) {

@@ -69,6 +69,8 @@ std::vector<Case> cases() {
     s.rods[0].material.linear_rotational_inertia = 0.05;
   });
   add("couples in dynamics", true, [](Scene &s) { s.moments = {{0, 9, 0.8, Vec3(0.5, 0.3, 1)}}; });
+  add("follower forces", false, [](Scene &s) { s.followers = {{0, 10, Vec3(0.3, 0.5, -0.4)}, {0, 6, Vec3(-0.4, 0.2, 0.6)}}; });
+  add("follower forces in dynamics", true, [](Scene &s) { s.followers = {{0, 10, Vec3(2, 3, -4)}}; });
   add("dissipation by mass", true, [&](Scene &s) {
     moving(s);
     s.rods[0].material.mass_damping_coefficient = 30;
@@ -232,7 +234,7 @@ TEST(EveryTerm, HasTheDerivativeOfItsForces) {
       EXPECT_PETSC(bench.sim.solver.inertiaAtIterate(&negative));
       EXPECT_EQ(negative, 0);
       NewtonSolver &solver = bench.sim.solver.front();
-      Circulatory circulatory(bench.potential(), {bench.potential().all()});
+      Circulatory circulatory(bench.potential(), {bench.potential().all()}, bench.potential().all());
       if (!circulatory.isNone()) {
         EXPECT_PETSC(circulatory.update([&](const Planes &r, Planes &x) { return solver.solveLinear(r, x); }));
       }

@@ -36,7 +36,7 @@ TEST(Circulatory, DirectionSolvesTheWholeDerivative) {
   ASSERT_TRUE(finished) << loop.failure();
 
   IncrementalPotential &potential = *sim.potential;
-  Circulatory circulatory(potential, {potential.all()});
+  Circulatory circulatory(potential, {potential.all()}, potential.all());
   ASSERT_FALSE(circulatory.isNone());
   int negative;
   EXPECT_PETSC(sim.solver.inertiaAtIterate(&negative));

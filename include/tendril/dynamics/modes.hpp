@@ -4,6 +4,10 @@
 /// matrix (solver/mass.hpp), without damping. Krylov-Schur (Stewart 2001, in SLEPc) on (K - s M)^-1 M with a shift s
 /// below all eigenvalues and the factorisation that Newton has, which keeps the digits of fine rods; the inertia of K -
 /// t M with t just above the last eigenvalue counts whether any is missing (Sylvester).
+///
+/// Where couples or follower forces act, K is the derivative of all forces and not symmetric, and nothing counts:
+/// Krylov-Schur finds the eigenvalues nearest to s, pairs of complex ones among them, which flutter: from two
+/// frequencies that have met (Bolotin 1963, Nonconservative Problems of the Theory of Elastic Stability).
 
 #include "tendril/solver/step_solver.hpp"
 
@@ -11,17 +15,22 @@ namespace tendril {
 
 /// The lowest modes, from the lowest on; n of them.
 struct Modes {
-  std::vector<double> eigenvalue; ///< (n) omega^2; negative where the equilibrium is unstable [1/s^2]
+  /// (n) omega^2, of complex ones the real part; negative where the equilibrium is unstable without flutter [1/s^2]
+  std::vector<double> eigenvalue;
+  /// (n) The imaginary part of omega^2, positive in the first of a pair, whose partner follows: the motion that grows
+  /// is exp(growthRate t) (first shape cos(frequency t) + second shape sin(frequency t)). Else 0 [1/s^2]
+  std::vector<double> imaginary;
   /// (n) Displacements, twists, and displacements of centres of mass and rotation vectors of bodies, with phi' M phi =
-  /// 1 kg m^2; of both signs that with a positive largest displacement, or twist where nothing is displaced. Twist: by
-  /// which an edge turns about its tangent, parallel transport taken off.
+  /// 1 kg m^2, of a pair in sum; of both signs that with a positive largest displacement, or twist where nothing is
+  /// displaced. Twist: by which an edge turns about its tangent, parallel transport taken off.
   std::vector<Rates> shape;
   std::vector<double> zero; ///< (n) up to this size they are of motions that cost nothing, to rounding [1/s^2]
 
   int count() const { return int(eigenvalue.size()); }
-  bool isFree(int k) const { return std::abs(eigenvalue[std::size_t(k)]) <= zero[std::size_t(k)]; }
-  bool isUnstable(int k) const { return eigenvalue[std::size_t(k)] < -zero[std::size_t(k)]; }
-  double frequency(int k) const;  ///< 0 of free and unstable ones [rad/s]
+  bool flutters(int k) const { return imaginary[std::size_t(k)] != 0; }
+  bool isFree(int k) const { return !flutters(k) && std::abs(eigenvalue[std::size_t(k)]) <= zero[std::size_t(k)]; }
+  bool isUnstable(int k) const { return flutters(k) || eigenvalue[std::size_t(k)] < -zero[std::size_t(k)]; }
+  double frequency(int k) const;  ///< 0 of free ones, and of unstable ones that do not flutter [rad/s]
   double growthRate(int k) const; ///< of unstable ones, or 0 [1/s]
 };
 

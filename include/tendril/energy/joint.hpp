@@ -69,6 +69,11 @@ struct JointLaw {
   }
 };
 
+/// Forces of an exact joint, by row, that carry one of its bodies: with them, what acts on it does no work in motions
+/// by which alone what the joint holds changes, shifts along its axes and turns about its point. \param of_parent
+/// whether the body is the parent \param body out of balance, force and moment about its centre
+Rows carryingForces(const Joint &joint, const JointPlace &place, bool of_parent, const Eigen::Vector<double, 6> &body);
+
 /// How fast the bodies of a joint leave what it holds, turns by the size of the child [m/s].
 double tearingOf(const Scene &scene, const Elements &elements, int index, const State &state, const Configuration &c);
 

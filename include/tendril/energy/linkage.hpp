@@ -13,31 +13,35 @@ namespace tendril {
 /// that close loops hold at its end.
 class Linkage {
 public:
+  /// `placed` is the child, or the parent, by which goes the other and the joint.
+  struct TreeJoint {
+    int joint;
+    bool places_parent;
+  };
   Linkage(const Scene &scene, const Elements &elements);
   /// Whether a body beside a rod, or one that it is tied to, is in a tree.
   bool moves(int rod) const { return !hosts_.empty() && !hosts_[std::size_t(rod)].empty(); }
+  /// Those of trees on a rod, from roots to leaves.
+  std::span<const TreeJoint> trees(int rod) const { return links_[std::size_t(rod)]; }
+  bool isOfTree(int joint) const { return of_tree_[std::size_t(joint)]; }
   /// The increments of a rod, as they are scaled, with those of bodies in trees and of what is tied to these.
   /// \param from where targets are at the end of the step \return by how much a body in these trees turns at most [rad]
   double correct(const Configuration &from, const Planes &increment, double scale, int rod, Planes &out) const;
 
 private:
-  /// \see BodyPair. `placed` is the child, or the parent.
-  struct Link {
-    int joint;
-    bool places_parent;
-  };
   /// Of a body: displacement of its centre of mass and rotation vector [m], [rad].
   struct Move {
     Vec3 translation, turn;
   };
   const Scene &scene_;
   const Elements &elements_;
-  std::vector<std::vector<Link>> links_; ///< per rod that has their bodies, from roots to leaves
-  std::vector<std::vector<int>> hosts_;  ///< per rod: those that have bodies which it goes with; empty: there are none
-  std::vector<char> in_tree_;            ///< per body
-  mutable std::vector<Move> moves_;      ///< per body
+  std::vector<std::vector<TreeJoint>> links_; ///< per rod that has their bodies, from roots to leaves
+  std::vector<std::vector<int>> hosts_; ///< per rod: those that have bodies which it goes with; empty: there are none
+  std::vector<char> in_tree_;           ///< per body
+  std::vector<char> of_tree_;           ///< per joint
+  mutable std::vector<Move> moves_;     ///< per body
 
-  void follow(const Link &link, const Configuration &from, const Planes &increment, double scale) const;
+  void follow(const TreeJoint &link, const Configuration &from, const Planes &increment, double scale) const;
 };
 
 } // namespace tendril

@@ -160,6 +160,10 @@ public:
                            const Configuration & /*trial*/, int /*rod*/, Planes & /*force*/) const {
     return 0;
   }
+  /// Gives exact joints the forces that carry the bodies which they place, so that these have no part in the gradient
+  /// but along what their joints leave free. \param gradient at the iterate, which receives the forces \return whether a
+  /// rod has any
+  virtual bool carry(int /*rod*/, const Planes & /*gradient*/, Configuration & /*iterate*/) { return false; }
   /// What of the energy of a rod stands for exact constraints that are not met [J].
   virtual double violation(const Configuration & /*configuration*/, int /*rod*/) const { return 0; }
   /// By how much exact constraints beside a rod are missed at most, over the size of what they hold.

@@ -308,11 +308,16 @@ inline constexpr Key scene_keys[] = {
     {"junctions[].rod", KeyType::rod, "", "(all)", "of shared points: of which rods", anything, "", "all"},
     {"junctions[].within", KeyType::number, "m", "1e-9", "how far apart what is joined may be drawn", not_negative, "",
      "1e-6"},
-    {"loads", KeyType::list, "", "(none)", "dead loads; in statics they grow with the load factor"},
+    {"loads", KeyType::list, "", "(none)", "loads; in statics they grow with the load factor"},
     {"loads[].rod", KeyType::rod, "", "(the only one)", "which rod", anything, "", "0"},
     {"loads[].vertex", KeyType::index, "", "(with force or mass: required)", "where the force acts, or the mass is",
      not_negative, "", "last"},
     {"loads[].force", KeyType::vector, "N", "(another load)", "force on a vertex", anything, "", "[0, 0, 1e-3]"},
+    {"loads[].axes", KeyType::word, "", "world",
+     "of a force: fixed in space, or turning with the rod (a follower force): along the first and the second director "
+     "and "
+     "the tangent",
+     anything, "world|material", "material"},
     {"loads[].mass", KeyType::number, "kg", "(another load)",
      "point mass on a vertex: its inertia, and its weight where gravity acts on the rod", positive, "", "0.1"},
     {"loads[].edge", KeyType::index, "", "(with couples: required)", "where the couple acts", not_negative, "", "last"},

@@ -28,6 +28,15 @@ struct EndCouple {
   double torque;                    ///< ... and about the tangent [N m]
 };
 
+/// A force on a vertex that turns with an edge which ends there.
+struct PlacedFollower {
+  int rod, vertex, edge; ///< the vertex and the edge by their slots
+  Vec3 force;            ///< along the directors and the tangent of the edge, at load factor 1 [N]
+  Vec3 along(const Frame &f) const {
+    return force[0] * f.director + force[1] * f.secondDirector() + force[2] * f.tangent;
+  }
+};
+
 class Elements {
 public:
   std::vector<RodRange> rods;
@@ -69,6 +78,7 @@ public:
   std::span<const int> supportsOf(int rod) const { return supports_.of(rod); }
   std::span<const int> forcesOf(int rod) const { return forces_.of(rod); }
   std::span<const int> momentsOf(int rod) const { return moments_.of(rod); }
+  std::span<const PlacedFollower> followers(RodSet set) const { return followers_.of(set); }
   std::span<const int> tendonsOf(int rod) const { return tendons_.of(rod); }
   /// Of a tendon, [begin, end).
   std::pair<int, int> tendonSlots(int k) const { return {tendon_slot[k], tendon_slot[k] + tendon_slots_[k]}; }
@@ -105,6 +115,7 @@ private:
   Planes constants_, cells_;
   std::vector<double> length_;    ///< per rod
   std::vector<int> tendon_slots_; ///< how many each has
+  ByRod<PlacedFollower> followers_;
   ByRod<JoinedEdge> joined_edges_;
   ByRod<JoinedVertex> joined_vertices_;
   ByRod<Tie> ties_;
@@ -117,6 +128,7 @@ private:
   std::vector<int> place_of_body_; ///< of each body in bodies_
   std::vector<Vec3> arm_;          ///< per joined vertex
   void weighBodies(const Scene &scene);
+  void placeFollowers(const Scene &scene);
   std::vector<Frame> joined_frame_;           ///< as drawn, of unit length
   std::vector<std::vector<int>> constraints_; ///< per rod
   std::vector<Pins> pins_;                    ///< per rod

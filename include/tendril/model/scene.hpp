@@ -137,6 +137,12 @@ struct NodalForce {
   Vec3 force;      ///< [N]
   double mass = 0; ///< [kg]
 };
+/// A force that turns with the frame of the edge at its vertex; of two edges, half with either.
+struct FollowerForce {
+  int rod, vertex;
+  Vec3 force; ///< along the first and the second director and the tangent [N]
+  bool isTangential() const { return force[0] == 0 && force[1] == 0; }
+};
 struct EdgeMoment {
   int rod, edge;
   double torque; ///< about the tangent [N m]
@@ -168,6 +174,7 @@ struct Scene {
   /// Whether junctions, ties, bodies or tendons join rods.
   bool isJoined() const;
   std::vector<NodalForce> forces;
+  std::vector<FollowerForce> followers;
   std::vector<EdgeMoment> moments;
   std::vector<Collider> colliders;
   Vec3 gravity{0, -9.81, 0}; ///< [m/s^2]

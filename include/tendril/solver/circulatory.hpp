@@ -1,8 +1,8 @@
 #pragma once
 /// \file circulatory.hpp
-/// What the derivative of couples has beyond a symmetric matrix. A couple M fixed in space, or a torque T about the
-/// tangent, does the work (M + T t).phi in a motion whose spin is phi, and no potential has that for its differential:
-/// the derivative of its generalised forces
+/// What the derivative of couples and of follower forces has beyond a symmetric matrix. A couple M fixed in space, or a
+/// torque T about the tangent, does the work (M + T t).phi in a motion whose spin is phi, and no potential has that for
+/// its differential: the derivative of its generalised forces
 /// -(M + T t).phi_i by the unknowns j, in the coordinates of the retraction, is the symmetric part that the band holds,
 /// and
 ///
@@ -11,7 +11,12 @@
 /// (the Maurer-Cartan equation of the rotations, in space for M, in the frame for T; structural mechanics calls such
 /// forces circulatory, Ziegler 1968, Principles of Structural Stability). That is of rank two for each couple, so that
 /// Newton's direction comes from the factored symmetric part and two more solves a couple, by the formula of Sherman,
-/// Morrison and Woodbury, whatever the linear solver.
+/// Morrison and Woodbury, whatever the linear solver. A force F on a vertex v that turns with an edge whose spin is phi
+/// has the derivative
+///
+///     -phi x F = |F| (q (p.phi) - p (q.phi)),  p, q and F/|F| orthonormal and right-handed
+///
+/// in the rows of the vertex, of rank two as well: all of it stands here, none in the band.
 
 #include "tendril/solver/incremental_potential.hpp"
 
@@ -22,10 +27,10 @@ namespace tendril {
 
 class Circulatory {
 public:
-  /// Of the couples on the rods of some islands.
-  Circulatory(const IncrementalPotential &potential, std::vector<RodSet> islands);
-  bool isNone() const { return couples_.empty(); }
-  bool acts(RodSet island) const { return countOn(island) > 0; }
+  /// Of the couples and follower forces on the rods of some islands. \param rods those that arrays of `solve` are over
+  Circulatory(const IncrementalPotential &potential, std::vector<RodSet> islands, RodSet rods);
+  bool isNone() const { return sources_.empty(); }
+  bool acts(RodSet island) const { return pairsOn(island) > 0; }
 
   /// Takes up the couples at the iterate, and the symmetric part of the Hessian there, which `solve` (right-hand side,
   /// solution) solves with.
@@ -35,28 +40,38 @@ public:
   bool correct(Planes &solution) const;
 
 private:
-  /// One of the two columns of a couple: over x, y, z of the edge's vector, and its twist; or over the spin of a body
-  /// at the slot.
+  /// One of the columns: over x, y, z of the edge's vector, and its twist; or over the vector at the slot, the spin of
+  /// a body or the place of a vertex.
   struct Column {
     int rod, slot;
     Vec3 edge;
     double twist;
-    bool of_body;
+    bool of_vector;
     double dot(const Planes &x) const;
     void addTo(Planes &x) const;
   };
   const IncrementalPotential &potential_;
   std::vector<RodSet> islands_;
-  /// On an edge, or where that is -1 what the spin of a body has beyond a symmetric matrix.
-  struct Couple : EdgeMoment {
+  /// One of a couple on an edge, what the spin of a body has beyond a symmetric matrix, and a follower force.
+  struct Source {
+    int rod;
+    const EdgeMoment *couple = nullptr;
     const JoinedBody *body = nullptr;
+    const PlacedFollower *follower = nullptr;
+    int pairs() const { return follower ? 2 : 1; } ///< of columns
   };
-  std::vector<Couple> couples_; ///< by rod
-  int countOn(RodSet island) const;
-  std::vector<Column> columns_;  ///< two for each couple
-  std::vector<double> strength_; ///< half of |M| for each couple [N m]
-  Planes right_;                 ///< of the islands, as those solved
-  std::vector<Planes> solved_;   ///< the k-th columns of all islands, solved
+  /// The matrix has forward a b' + backward b a' of two columns a and b that follow each other.
+  struct Strength {
+    double forward, backward;
+  };
+  std::vector<Source> sources_; ///< by rod
+  int pairsOn(RodSet island) const;
+  void addCouple(const Source &source, int slot, const Vec3 &moment);
+  void addFollower(const PlacedFollower &follower);
+  std::vector<Column> columns_;    ///< two for each pair
+  std::vector<Strength> strength_; ///< of each pair
+  Planes right_;                   ///< over the rods, as those solved
+  std::vector<Planes> solved_;     ///< the k-th columns of all islands, solved
 };
 
 } // namespace tendril

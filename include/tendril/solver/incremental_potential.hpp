@@ -135,6 +135,9 @@ public:
   }
   const EdgeBlocks &blocks() const { return derivatives_.blocks; }
 
+  /// In statics joints of trees take the forces that carry what they place, at the iterate: as in reduced coordinates,
+  /// energies then fall along what they leave free alone, and their curvature is that of the forces.
+  void carryTrees(RodSet island);
   /// Trial configuration R(iterate, scale x increment) of one rod, with its axial forces; obstacles that move go the
   /// same part of their way. False when it is impossible, or when something is in the way.
   /// \param free receives the part of the straight way from the iterate on which nothing is

@@ -220,11 +220,13 @@ private:
   double firstShift(RodSet island) const;
   PetscErrorCode includeMotion(Vec y);
   PetscErrorCode includeCirculation(bool *regular);
+  bool circulates(RodSet island) const;
   /// What a line search goes by.
   struct Descent {
     double slope = 0;                       ///< of the energy, by the length [J]
     IncrementalPotential::RodEnergy before; ///< at the iterate
     bool free = false;                      ///< whether the energy may rise
+    bool circulates = false;                ///< for couples or follower forces: then forces must not get much larger
   };
   enum class Length { good, too_long, too_short };
   IncrementalPotential::RodEnergy tryLength(RodSet island, double length);
@@ -235,7 +237,7 @@ private:
   bool standStill(RodSet island, double *lambda);
   void goBeyond(RodSet island, const Descent &descent, double *lambda, IncrementalPotential::RodEnergy *there);
   bool search(RodSet island, double *lambda);
-  bool residualFalls(RodSet island, double length);
+  bool residualFalls(RodSet island, double length, double most = 1);
   bool sharesFactor() const;
   enum class Verdict { answer, going, saddle, lost }; ///< the worse the later
   Verdict judge(int rod, double rtol);
