@@ -14,8 +14,9 @@ constexpr const char *vanishing_edge =
     "an edge vanishes or turns back on itself; use more edges, or a larger axial_stiffness";
 
 ArcLength::ArcLength(StepSolver &solver, const LoopSettings &settings)
-    : solver_(solver), settings_(settings), metric_(solver.potential().dofs().makePlanes()),
-      load_derivatives_(solver.potential().dofs().slots()) {
+    : solver_(solver), settings_(settings),
+      circulation_(solver.potential(), {solver.potential().all()}, solver.potential().all()),
+      metric_(solver.potential().dofs().makePlanes()), load_derivatives_(solver.potential().dofs().slots()) {
   const IncrementalPotential &potential = solver.potential();
   const Elements &e = potential.elements();
   loads_.push_back(makeLoad(potential.scene(), e));
@@ -75,11 +76,15 @@ PetscErrorCode ArcLength::solveLoad(Planes *response) {
   PetscFunctionReturn(0);
 }
 
-/// Newton's step for a gradient.
+/// Newton's step for a gradient, by the whole derivative of the forces.
 PetscErrorCode ArcLength::solve(const Planes &gradient, Planes *step) {
   PetscFunctionBeginUser;
   if (step->size() == 0) *step = solver_.potential().dofs().makePlanes();
   PetscCall(solver_.front().solveLinear(gradient, *step));
+  if (!circulation_.isNone()) {
+    PetscCall(circulation_.update([this](const Planes &r, Planes &x) { return solver_.front().solveLinear(r, x); }));
+    circulation_.correct(*step);
+  }
   for (double &y : *step) y = -y;
   PetscFunctionReturn(0);
 }

@@ -2,6 +2,7 @@
 /// rigid ones and their own limit, and how a column under a tangential force begins to flutter.
 #include "support/rods.hpp"
 
+#include "tendril/dynamics/arc_length.hpp"
 #include "tendril/dynamics/integrator.hpp"
 #include "tendril/dynamics/modes.hpp"
 
@@ -74,6 +75,32 @@ TEST(FollowerForces, BendAndTwistARodAsIntegratedFromItsEnd) {
   const Vec3 coarse = end(40), fine = end(80);
   EXPECT_NEAR(order((coarse - exact).norm(), (fine - exact).norm()), 2, 0.1);
   EXPECT_LT(((4 * fine - coarse) / 3 - exact).norm(), 2e-5); // the fourth power of a turn of 0.1 an edge
+}
+
+/// Newton on the arc length has the whole derivative, too: few iterations, and the same end.
+TEST(FollowerForces, AreFollowedAlongTheArcLength) {
+  Scene scene = cantilever(20);
+  scene.followers = {{0, 20, Vec3(1.5, -2, -1)}};
+  Simulation along, steps;
+  runTo(steps, scene, statics(4));
+  LoopSettings settings = statics(10);
+  settings.continuation = Continuation::arclength;
+  EXPECT_PETSC(along.setUp(scene, settings));
+  ArcLength path(along.solver, settings);
+  bool finished = false;
+  int iterations = 0, points = 0;
+  EXPECT_PETSC(path.run(
+      along.state,
+      [&](const State &, const Diagnostics &row) {
+        iterations += row.newton_iterations;
+        ++points;
+        return PetscErrorCode(0);
+      },
+      &finished));
+  EXPECT_TRUE(finished) << path.failure();
+  EXPECT_NEAR(along.state.time, 1, 1e-9);
+  EXPECT_LE(iterations, 5 * points);
+  EXPECT_LT((along.state.position.back() - steps.state.position.back()).norm(), 1e-5); // to -snes_rtol
 }
 
 /// A force that turns with a free stiff rod, square to it: turns as alpha t^2/2, and its centre goes by that force.

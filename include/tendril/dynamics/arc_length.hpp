@@ -4,6 +4,7 @@
 /// limit points of the load.
 
 #include "tendril/dynamics/time_loop.hpp"
+#include "tendril/solver/circulatory.hpp"
 
 namespace tendril {
 
@@ -33,7 +34,8 @@ private:
   StepSolver &solver_;
   LoopSettings settings_;
   std::vector<std::unique_ptr<Term>>
-      loads_; ///< at load factor 1: their gradient is the derivative of the gradient by the load factor
+      loads_;               ///< at load factor 1: their gradient is the derivative of the gradient by the load factor
+  Circulatory circulation_; ///< of couples and follower forces
   Planes metric_;
   Derivatives load_derivatives_;
   Point last_; ///< the last step taken
