@@ -6,8 +6,8 @@
 namespace tendril {
 
 Linkage::Linkage(const Scene &scene, const Elements &elements)
-    : scene_(scene), elements_(elements), links_(scene.rods.size()), in_tree_(scene.bodies.size(), false), of_tree_(scene.joints.size(), false),
-      moves_(scene.bodies.size()) {
+    : scene_(scene), elements_(elements), links_(scene.rods.size()), in_tree_(scene.bodies.size(), false),
+      of_tree_(scene.joints.size(), false), moves_(scene.bodies.size()) {
   const int count = int(scene.bodies.size()), world = count;
   std::vector<int> first(std::size_t(count) + 1);
   std::iota(first.begin(), first.end(), 0);

@@ -69,7 +69,9 @@ std::vector<Case> cases() {
     s.rods[0].material.linear_rotational_inertia = 0.05;
   });
   add("couples in dynamics", true, [](Scene &s) { s.moments = {{0, 9, 0.8, Vec3(0.5, 0.3, 1)}}; });
-  add("follower forces", false, [](Scene &s) { s.followers = {{0, 10, Vec3(0.3, 0.5, -0.4)}, {0, 6, Vec3(-0.4, 0.2, 0.6)}}; });
+  add("follower forces", false, [](Scene &s) {
+    s.followers = {{0, 10, Vec3(0.3, 0.5, -0.4)}, {0, 6, Vec3(-0.4, 0.2, 0.6)}};
+  });
   add("follower forces in dynamics", true, [](Scene &s) { s.followers = {{0, 10, Vec3(2, 3, -4)}}; });
   add("dissipation by mass", true, [&](Scene &s) {
     moving(s);

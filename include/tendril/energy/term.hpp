@@ -161,8 +161,8 @@ public:
     return 0;
   }
   /// Gives exact joints the forces that carry the bodies which they place, so that these have no part in the gradient
-  /// but along what their joints leave free. \param gradient at the iterate, which receives the forces \return whether a
-  /// rod has any
+  /// but along what their joints leave free. \param gradient at the iterate, which receives the forces \return whether
+  /// a rod has any
   virtual bool carry(int /*rod*/, const Planes & /*gradient*/, Configuration & /*iterate*/) { return false; }
   /// What of the energy of a rod stands for exact constraints that are not met [J].
   virtual double violation(const Configuration & /*configuration*/, int /*rod*/) const { return 0; }
