@@ -49,7 +49,7 @@ void multiplyMass(const IncrementalPotential &potential, RodSet islands, const P
   dofs.foldJoined(islands, out);
 }
 
-constexpr double little_spin = 1e-9; // of the torsional stiffness of a rod
+constexpr double little_spin = 1e-12; // of the torsional stiffness of a rod: below what free motions are told by
 
 int massRank(const IncrementalPotential &potential, RodSet islands) {
   const Elements &e = potential.elements();
@@ -93,7 +93,7 @@ PetscErrorCode NewtonSolver::factorWith(Metric metric, RodSet island, double fac
   if (metric == Metric::mass) {
     addMass(*potential_, island, factor, blocks);
     // A spin that costs nothing and has no inertia has no frequency: a little stiffness at one edge tells where it is.
-    for (int r = island.begin; r < island.end; ++r) {
+    for (int r = island.begin; r < island.end && potential_->elements().bodies(island).empty(); ++r) {
       const RodRange &rod = potential_->elements().rods[r];
       const Material &m = potential_->scene().rods[r].material;
       if (rod.twist && m.linear_rotational_inertia == 0)
