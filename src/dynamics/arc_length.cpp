@@ -76,15 +76,23 @@ PetscErrorCode ArcLength::solveLoad(Planes *response) {
   PetscFunctionReturn(0);
 }
 
-/// Newton's step for a gradient, by the whole derivative of the forces.
+/// Factors the whole derivative of the forces at the iterate.
+PetscErrorCode ArcLength::factor(int *negative) {
+  PetscFunctionBeginUser;
+  PetscCall(solver_.inertiaAtIterate(negative, regular_lift));
+  if (*negative < 0)
+    obstacle_ = cannot_factor;
+  else if (!circulation_.isNone())
+    PetscCall(circulation_.update([this](const Planes &r, Planes &x) { return solver_.front().solveLinear(r, x); }));
+  PetscFunctionReturn(0);
+}
+
+/// Newton's step for a gradient, by what was factored last.
 PetscErrorCode ArcLength::solve(const Planes &gradient, Planes *step) {
   PetscFunctionBeginUser;
   if (step->size() == 0) *step = solver_.potential().dofs().makePlanes();
   PetscCall(solver_.front().solveLinear(gradient, *step));
-  if (!circulation_.isNone()) {
-    PetscCall(circulation_.update([this](const Planes &r, Planes &x) { return solver_.front().solveLinear(r, x); }));
-    circulation_.correct(*step);
-  }
+  if (!circulation_.isNone()) circulation_.correct(*step);
   for (double &y : *step) y = -y;
   PetscFunctionReturn(0);
 }
@@ -92,8 +100,7 @@ PetscErrorCode ArcLength::solve(const Planes &gradient, Planes *step) {
 /// Unit tangent of the path at the iterate, on the side of the last step.
 PetscErrorCode ArcLength::tangent(Point *direction) {
   PetscFunctionBeginUser;
-  PetscCall(solver_.inertiaAtIterate(&negative_, regular_lift));
-  if (negative_ < 0) obstacle_ = cannot_factor;
+  PetscCall(factor(&negative_));
   direction->factor = 1;
   PetscCall(solveLoad(&direction->unknowns));
   const double side = last_.unknowns.size() == 0 ? 1 : product(*direction, last_),
@@ -136,11 +143,8 @@ PetscErrorCode ArcLength::iterate(
     if (*converged) PetscFunctionReturn(0);
     if (k == most_iterations) break;
     int negative;
-    PetscCall(solver_.inertiaAtIterate(&negative, regular_lift));
-    if (negative < 0) {
-      obstacle_ = cannot_factor;
-      PetscFunctionReturn(0);
-    }
+    PetscCall(factor(&negative));
+    if (negative < 0) PetscFunctionReturn(0);
     Point moved, correction, load;
     load.factor = 1;
     potential.coordinates(moved.unknowns);

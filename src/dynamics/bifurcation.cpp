@@ -9,11 +9,15 @@ namespace tendril {
 double distanceBetween(const Team &team, const State &a, const State &b) {
   Vec3 low = a.position[0], high = low;
   double apart = 0;
-  for (std::size_t v = 0; v < a.position.size(); ++v) {
-    low = low.cwiseMin(a.position[v]);
-    high = high.cwiseMax(a.position[v]);
-    apart = std::max(apart, (a.position[v] - b.position[v]).norm());
-  }
+  auto compare = [&](const std::vector<Vec3> &from, const std::vector<Vec3> &to) {
+    for (std::size_t v = 0; v < from.size(); ++v) {
+      low = low.cwiseMin(from[v]);
+      high = high.cwiseMax(from[v]);
+      apart = std::max(apart, (from[v] - to[v]).norm());
+    }
+  };
+  compare(a.position, b.position);
+  compare(a.body_position, b.body_position);
   Tally tally;
   for (int k = 0; k < 3; ++k) tally.smallest(low[k]).largest(high[k]);
   team.combine(tally.largest(apart));

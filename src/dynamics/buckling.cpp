@@ -1,7 +1,6 @@
 #include "tendril/dynamics/buckling.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -11,19 +10,15 @@ namespace {
 constexpr double early = 1e-3; // of the first step: where the path begins, for without loads a rod may be anywhere
 
 /// How far a state lies from the middle of two others, over how far these are apart; 0 where they are one to rounding.
-double bendOf(const State &from, const State &middle, const State &to) {
+double bendOf(const Team &team, const State &from, const State &middle, const State &to) {
   constexpr double rounding = 1e-10; // of the coordinates
-  double apart = 0, off = 0, size = 0;
-  auto add = [&](const std::vector<Vec3> &a, const std::vector<Vec3> &m, const std::vector<Vec3> &b) {
-    for (std::size_t v = 0; v < a.size(); ++v) {
-      apart = std::max(apart, (b[v] - a[v]).norm());
-      off = std::max(off, (m[v] - 0.5 * (a[v] + b[v])).norm());
-      size = std::max(size, (a[v] - a[0]).norm());
-    }
-  };
-  add(from.position, middle.position, to.position);
-  add(from.body_position, middle.body_position, to.body_position);
-  return apart > rounding * size ? off / apart : 0;
+  State straight = from;
+  for (std::size_t v = 0; v < from.position.size(); ++v)
+    straight.position[v] = 0.5 * (from.position[v] + to.position[v]);
+  for (std::size_t b = 0; b < from.body_position.size(); ++b)
+    straight.body_position[b] = 0.5 * (from.body_position[b] + to.body_position[b]);
+  const double apart = distanceBetween(team, from, to);
+  return apart > rounding ? distanceBetween(team, straight, middle) / apart : 0;
 }
 
 /// Makes the largest displacement, or where nothing is displaced the largest twist, one; of both signs that with a
@@ -120,7 +115,7 @@ PetscErrorCode BucklingPath::advance(const Point &from, double factor, Point *to
   if (!middle.found) PetscFunctionReturn(0);
   PetscCall(reach(middle, factor, to));
   if (!to->found) PetscFunctionReturn(0);
-  if (bendOf(from.state, middle.state, to->state) > bent) {
+  if (bendOf(solver_.team(), from.state, middle.state, to->state) > bent) {
     to->found = false;
     to->report.reason = "it bends too sharply, or the nearest equilibrium is on another branch";
     PetscFunctionReturn(0);
@@ -177,29 +172,6 @@ PetscErrorCode BucklingPath::locateAll(const Point &at, const Point &next, bool 
     all.insert(all.end(), roots.begin(), roots.end());
   }
   PetscCall(note(all));
-  PetscFunctionReturn(0);
-}
-
-/// Whether the load cannot rise beyond a factor: the path comes there as the root of what is left of the load, while it
-/// goes straight through a bifurcation.
-PetscErrorCode BucklingPath::isLimit(const Point &low, double factor, bool *limit) {
-  constexpr double nearest = 3e-5;  // of the factor
-  constexpr double between = 0.375; // along a root the second step is half of the first, straight on a quarter
-  std::array<State, 3> at;
-  PetscFunctionBeginUser;
-  *limit = false;
-  State from = low.state;
-  for (std::size_t k = 0; k < at.size(); ++k) {
-    NewtonReport report;
-    bool found;
-    const double there = factor - nearest * std::pow(4.0, 2.0 - double(k)) * std::abs(factor);
-    PetscCall(balance(from, there, &at[k], &report, &found));
-    if (!found) PetscFunctionReturn(0);
-    from = at[k];
-  }
-  const double first = distanceBetween(solver_.team(), at[0], at[1]),
-               second = distanceBetween(solver_.team(), at[1], at[2]);
-  *limit = first > 1e-9 && second > between * first;
   PetscFunctionReturn(0);
 }
 

@@ -26,16 +26,10 @@ double atZero(std::vector<std::pair<double, double>> p, std::size_t count) {
 }
 
 /// Whether a state lies no farther from both ends of a piece of a path than these are apart, but for rounding.
-bool liesBetween(const State &low, const State &state, const State &high) {
+bool liesBetween(const Team &team, const State &low, const State &state, const State &high) {
   constexpr double rounding = 1e-7, room = 1.5;
-  double apart = 0, away = 0, size = 0;
-  for (std::size_t v = 0; v < low.position.size(); ++v) {
-    apart = std::max(apart, (high.position[v] - low.position[v]).norm());
-    away =
-        std::max({away, (state.position[v] - low.position[v]).norm(), (state.position[v] - high.position[v]).norm()});
-    size = std::max(size, (low.position[v] - low.position[0]).norm());
-  }
-  return away <= room * apart + rounding * size;
+  return std::max(distanceBetween(team, low, state), distanceBetween(team, state, high)) <=
+         room * distanceBetween(team, low, high) + rounding;
 }
 
 /// Components of motions, twists and spins times a length.
@@ -148,6 +142,28 @@ PetscErrorCode BucklingPath::resolve(const Point &a, const Point &b, double apar
   PetscFunctionReturn(0);
 }
 
+/// Whether the load cannot rise beyond a factor: the path comes there as the root of what is left of the load, while it
+/// goes straight through a bifurcation.
+PetscErrorCode BucklingPath::isLimit(const Point &low, double factor, bool *limit) {
+  constexpr double between = 0.375; // along a root the second step is half of the first, straight on a quarter
+  std::array<State, 3> at;
+  PetscFunctionBeginUser;
+  *limit = false;
+  State from = low.state;
+  for (std::size_t k = 0; k < at.size(); ++k) {
+    NewtonReport report;
+    bool found;
+    const double there = factor - beside * std::pow(4.0, 2.0 - double(k)) * std::abs(factor);
+    PetscCall(balance(from, there, &at[k], &report, &found));
+    if (!found) PetscFunctionReturn(0);
+    from = at[k];
+  }
+  const double first = distanceBetween(solver_.team(), at[0], at[1]),
+               second = distanceBetween(solver_.team(), at[1], at[2]);
+  *limit = first > 1e-9 && second > between * first;
+  PetscFunctionReturn(0);
+}
+
 /// The limit point ahead, at which the k-th stiffness is zero.
 PetscErrorCode BucklingPath::takeLimit(const Point &low, double factor, int k, std::vector<Root> *roots) {
   PetscFunctionBeginUser;
@@ -203,7 +219,7 @@ PetscErrorCode BucklingPath::locate(int k, Point low, Point high, bool ahead, bo
     for (const double other : {factor, low.factor + 0.4 * now}) {
       const Point from = ahead ? nearest(other) : low;
       PetscCall(ahead ? reach(from, other, &point) : advance(from, other, &point));
-      point.found = point.found && (!ahead || liesBetween(low.state, point.state, high.state));
+      point.found = point.found && (!ahead || liesBetween(solver_.team(), low.state, point.state, high.state));
       if (point.found || !ahead) break;
     }
     if (point.found)

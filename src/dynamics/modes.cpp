@@ -15,16 +15,15 @@
 
 namespace tendril {
 
-double Modes::frequency(int k) const {
-  return isFree(k) ? 0 : std::sqrt(std::complex(eigenvalue[std::size_t(k)], imaginary[std::size_t(k)])).real();
+/// Of what goes as exp(i omega t): 0 of free ones.
+static std::complex<double> angularFrequency(const Modes &modes, int k) {
+  if (modes.isFree(k)) return 0;
+  return std::sqrt(std::complex(modes.eigenvalue[std::size_t(k)], modes.imaginary[std::size_t(k)]));
 }
 
-double Modes::growthRate(int k) const {
-  return isFree(k) ? 0
-                   : std::abs(std::sqrt(std::complex(eigenvalue[std::size_t(k)], imaginary[std::size_t(k)])).imag());
-}
+double Modes::frequency(int k) const { return angularFrequency(*this, k).real(); }
 
-int massRank(const IncrementalPotential &potential) { return massRank(potential, potential.all()); }
+double Modes::growthRate(int k) const { return std::abs(angularFrequency(*this, k).imag()); }
 
 namespace {
 

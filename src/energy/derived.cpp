@@ -5,6 +5,7 @@
 #include "tendril/energy/term.hpp"
 #include "tendril/layout/same_vertices.hpp"
 
+#include <algorithm>
 #include <map>
 
 namespace tendril {
@@ -89,6 +90,8 @@ static std::map<int, Vec3> forcesThatDraw(const Scene &scene, const Elements &el
                                           const Configuration &c, const std::vector<ConstraintReading> &springs,
                                           bool dynamic) {
   std::map<int, Vec3> sum;
+  if (std::none_of(scene.supports.begin(), scene.supports.end(), [](const Support &s) { return s.holdsPosition(); }))
+    return sum;
   auto add = [&](int slot, const Vec3 &force) { sum.try_emplace(slot, Vec3::Zero()).first->second += force; };
   for (std::size_t k = 0; k < scene.constraints.size(); ++k) {
     const Constraint &spring = scene.constraints[k];

@@ -99,6 +99,27 @@ static double forceOf(const Scene &scene, const std::vector<const Body *> &bodie
   return force > 0 ? force : mass * size;
 }
 
+/// A rod between two pins, as large and as stiff as a mechanism, beside which its bodies are. \return its number
+static int addCarrier(const std::vector<const Body *> &mechanism, SceneFile &out) {
+  const Body &body = *mechanism.front();
+  double size = std::sqrt(body.own.inertia.trace() / body.own.mass);
+  for (const Body *other : mechanism) size = std::max(size, (other->position - body.position).norm());
+  Rod rod;
+  rod.name = "carrier of " + body.name;
+  while (out.names.isTaken(rod.name)) rod.name += "'";
+  rod.position = {body.position, body.position + Vec3(size, 0, 0)};
+  rod.material = {1e-9 * body.own.mass / size, 0, 1e4 * forceOf(out.scene, mechanism, size), 0, {0, 0}, 0, 0};
+  rod.gravity = false;
+  rod.contact.on = false;
+  setBishopDirectors(rod);
+  const int number = int(out.scene.rods.size());
+  for (const int v : {0, 1}) out.scene.supports.push_back({Support::Kind::pin, number, v, {}, frameAtVertex(rod, v)});
+  out.names.add(rod.name);
+  out.scene.rods.push_back(rod);
+  out.drawings.emplace_back();
+  return number;
+}
+
 void carryBodies(SceneFile &out) {
   Scene &scene = out.scene;
   const std::size_t count = scene.bodies.size();
@@ -130,41 +151,19 @@ void carryBodies(SceneFile &out) {
       join(b, pulled.front());
     }
   }
+  std::vector<std::vector<const Body *>> mechanism(count); // by its first body
   for (std::size_t b = 0; b < count; ++b) {
     const auto root = std::size_t(rootOf(int(b)));
     has_rod[root] = has_rod[root] || has_rod[b];
     joined[root] = joined[root] || joined[b];
+    mechanism[root].push_back(&scene.bodies[b]);
   }
   const bool alone = scene.rods.empty();
-  std::vector<int> carrier(count, -1);
   for (std::size_t b = 0; b < count; ++b) {
     const auto root = std::size_t(rootOf(int(b)));
     if (has_rod[root] || !(joined[root] || alone)) continue;
-    if (carrier[root] < 0) {
-      const Body &body = scene.bodies[root];
-      double size = std::sqrt(body.own.inertia.trace() / body.own.mass); // of the mechanism, and its mass
-      std::vector<const Body *> all;
-      for (std::size_t k = b; k < count; ++k)
-        if (std::size_t(rootOf(int(k))) == root) {
-          all.push_back(&scene.bodies[k]);
-          size = std::max(size, (all.back()->position - body.position).norm());
-        }
-      Rod rod;
-      rod.name = "carrier of " + body.name;
-      while (out.names.isTaken(rod.name)) rod.name += "'";
-      rod.position = {body.position, body.position + Vec3(size, 0, 0)};
-      rod.material = {1e-9 * body.own.mass / size, 0, 1e4 * forceOf(scene, all, size), 0, {0, 0}, 0, 0};
-      rod.gravity = false;
-      rod.contact.on = false;
-      setBishopDirectors(rod);
-      carrier[root] = int(scene.rods.size());
-      for (const int v : {0, 1})
-        scene.supports.push_back({Support::Kind::pin, carrier[root], v, {}, frameAtVertex(rod, v)});
-      out.names.add(rod.name);
-      scene.rods.push_back(rod);
-      out.drawings.emplace_back();
-    }
-    scene.bodies[b].rod = carrier[root];
+    if (root == b) scene.bodies[b].rod = addCarrier(mechanism[b], out);
+    scene.bodies[b].rod = scene.bodies[root].rod;
   }
 }
 

@@ -4,6 +4,7 @@
 #include "tendril/dynamics/simulation.hpp"
 #include "tendril/energy/work.hpp"
 #include "tendril/io/hdf5.hpp"
+#include "tendril/solver/mass.hpp"
 
 #include <algorithm>
 #include <iomanip>
@@ -144,7 +145,7 @@ void checkModes(const Scene &scene, const Options &o) {
 }
 
 void refuseTooManyModes(const Simulation &run, const Options &o) {
-  const int most = o.buckling ? int(run.dofs.unknowns(run.dofs.all())) : massRank(*run.potential);
+  const int most = o.buckling ? int(run.dofs.unknowns(run.dofs.all())) : massRank(*run.potential, run.dofs.all());
   if (o.modes > most)
     throw SceneError("option -modes: " + std::to_string(o.modes) + " are asked for, and the scene has " +
                      std::to_string(most) + (o.buckling ? " motions" : " motions with inertia") +

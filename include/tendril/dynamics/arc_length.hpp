@@ -79,6 +79,7 @@ private:
   std::string imbalance();
   PetscErrorCode findStart(State &state);
   PetscErrorCode tangent(Point *direction);
+  PetscErrorCode factor(int *negative);
   PetscErrorCode solve(const Planes &gradient, Planes *step);
   PetscErrorCode solveLoad(Planes *response);
   bool move(const Planes &increment, double factor);

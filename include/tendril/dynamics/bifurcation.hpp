@@ -53,7 +53,7 @@ PetscErrorCode locateCritical(StepSolver &solver, const Step &step, const Follow
 /// motions out that cost nothing.
 PetscErrorCode countUnstable(StepSolver &solver, int *unstable);
 
-/// Largest distance between vertices of two states, relative to the size of the scene.
+/// Largest distance between vertices, or centres of bodies, of two states, relative to the size of the scene.
 double distanceBetween(const Team &team, const State &a, const State &b);
 
 /// While it lives, Newton's tolerance is one that leaves critical loads eight digits.

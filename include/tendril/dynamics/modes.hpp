@@ -34,9 +34,6 @@ struct Modes {
   double growthRate(int k) const; ///< of unstable ones, or 0 [1/s]
 };
 
-/// Number of motions that have a frequency.
-int massRank(const IncrementalPotential &potential);
-
 /// The lowest eigenvalues of the Hessian at the iterate by a metric, and their motions, with phi' (metric) phi = 1.
 /// \param count of modes, at most the rank of the metric \param failure empty, or why not all could be told apart
 PetscErrorCode modesAtIterate(StepSolver &solver, Metric metric, int count, Modes *modes, std::string *failure);

@@ -314,9 +314,8 @@ inline constexpr Key scene_keys[] = {
      not_negative, "", "last"},
     {"loads[].force", KeyType::vector, "N", "(another load)", "force on a vertex", anything, "", "[0, 0, 1e-3]"},
     {"loads[].axes", KeyType::word, "", "world",
-     "of a force: fixed in space, or turning with the rod (a follower force): along the first and the second director "
-     "and "
-     "the tangent",
+     "of a force: fixed in space, or turning with the rod (a follower force): along the first and the second "
+     "director and the tangent",
      anything, "world|material", "material"},
     {"loads[].mass", KeyType::number, "kg", "(another load)",
      "point mass on a vertex: its inertia, and its weight where gravity acts on the rod", positive, "", "0.1"},
