@@ -75,12 +75,26 @@ double Motion::evenUntil(double from, double to) const {
   return turned > turn ? from + (next - from) * turn / turned : next;
 }
 
+std::vector<double> Motion::stopsBetween(double from, double to) const {
+  std::vector<double> corners, stops;
+  for (const Key &row : table)
+    if (std::min(from, to) < row.time && row.time < std::max(from, to)) corners.push_back(row.time);
+  if (to < from) std::reverse(corners.begin(), corners.end());
+  corners.push_back(to);
+  for (const double corner : corners) {
+    const int parts = 1 + int(2 * (rotationVectorAt(corner) - rotationVectorAt(from)).norm());
+    for (int k = 1; k < parts; ++k) stops.push_back(from + (corner - from) * k / parts);
+    stops.push_back(corner);
+    from = corner;
+  }
+  return stops;
+}
+
 Vec3 Motion::turnBetween(double from, double to) const {
-  const int parts = 1 + int(2 * (rotationVectorAt(to) - rotationVectorAt(from)).norm());
   Vec3 sum = Vec3::Zero();
   Mat3 before = rotationAt(from);
-  for (int k = 1; k <= parts; ++k) {
-    const Mat3 now = rotationAt(k == parts ? to : from + (to - from) * k / parts);
+  for (const double time : stopsBetween(from, to)) {
+    const Mat3 now = rotationAt(time);
     const Eigen::AngleAxisd turn(Mat3(now * before.transpose()));
     sum += turn.angle() * turn.axis();
     before = now;

@@ -34,10 +34,7 @@ void SupportMotion::turn(const Configuration &from, double from_time, double to_
       const Motion &motion = scene_.supports[s].motion;
       if (slot < 0) continue;
       Turned turned{slot, 0.0, from.frameAt(slot)};
-      // In parts of less than half a radian, so that whole turns within the step are counted.
-      const int parts = 1 + int(2 * (motion.rotationVectorAt(to_time) - motion.rotationVectorAt(from_time)).norm());
-      for (int k = 1; k <= parts; ++k) {
-        const double time = k == parts ? to_time : from_time + (to_time - from_time) * k / parts;
+      for (const double time : motion.stopsBetween(from_time, to_time)) {
         const Frame now = supportFrame(scene_.supports[s], time);
         turned.angle += halfAngleBetween(turned.end, now).angle();
         turned.end = now;
@@ -47,18 +44,15 @@ void SupportMotion::turn(const Configuration &from, double from_time, double to_
   }
 }
 
-/// In parts of less than half a radian, so that none passes half a turn unseen.
+/// In parts, so that none passes half a turn unseen.
 void SupportMotion::followTarget(int k, Configuration &iterate) {
   const Constraint &c = scene_.constraints[k];
   const int slot = elements_.constraint_slot[k];
-  const Motion &motion = c.motion;
   const bool jumps = !c.isPin() && c.measure == Constraint::Measure::angle;
-  const int parts =
-      jumps ? 1 + int(2 * (motion.rotationVectorAt(to_time_) - motion.rotationVectorAt(from_time_)).norm()) : 0;
   const Frame edge = iterate.frameAt(elements_.rods[c.rod].slot(c.at));
   Vec3 before = jumps ? rotationBetween(iterate.frameAt(slot), edge) : Vec3(Vec3::Zero());
-  for (int p = 1; p <= parts; ++p) {
-    const Vec3 now = rotationBetween(c.frameAt(from_time_ + (to_time_ - from_time_) * p / parts), edge);
+  for (const double time : jumps ? c.motion.stopsBetween(from_time_, to_time_) : std::vector<double>()) {
+    const Vec3 now = rotationBetween(c.frameAt(time), edge);
     if (jumpsBetween(before, now))
       beyond_barrier_ = "constraint '" + c.name +
                         "' is turned by more than half a turn from its edge; take shorter steps, or measure: sine";

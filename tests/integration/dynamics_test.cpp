@@ -166,6 +166,36 @@ TEST(Motion, OfAClampIsFollowedExactly) {
   }
 }
 
+/// Turns by six whole turns in a fiftieth of the way, in two corners of the table, and half a turn back after it:
+/// however a step lies about them, all are counted, in the twist, in what is stored and in the work.
+TEST(Motion, OfATableIsCountedInWholeTurnsWhateverTheSteps) {
+  Rod rod = straightRod(20, Measure::angle);
+  rod.material.flexural_stiffness = {1e8, 1e8}; // too stiff to writhe
+  Scene scene = clampedScene(rod);
+  scene.supports.push_back(hold(scene, 0, 20, Support::Kind::clamp));
+  const double most = 12 * pi, last = 11 * pi;
+  scene.supports[1].motion.table = {{0.3, Vec3::Zero(), Vec3::Zero()},
+                                    {0.31, Vec3::Zero(), Vec3(most, 0, 0)},
+                                    {0.32, Vec3::Zero(), Vec3(last, 0, 0)}};
+  const Motion &motion = scene.supports[1].motion;
+  EXPECT_NEAR(motion.turnBetween(0, 1).x(), last, 1e-12 * most);
+  EXPECT_NEAR(motion.turnBetween(1, 0).x(), -last, 1e-12 * most);
+  double before = 0;
+  for (const double time : motion.stopsBetween(0, 1)) {
+    EXPECT_LT((motion.rotationVectorAt(time) - motion.rotationVectorAt(before)).norm(), 0.5);
+    before = time;
+  }
+  EXPECT_EQ(before, 1);
+  const double stored = 0.5 * rod.material.torsional_stiffness * last * last; // GJ phi^2/(2 L), L = 1 m
+  for (const int steps : {1, 2, 3, 4, 5, 7, 50}) {
+    Simulation sim;
+    double work = 0;
+    runAndWatch(sim, scene, statics(steps), [&](const Diagnostics &row) { work += row.work.supports; });
+    EXPECT_NEAR(energyBudget(sim.scene, *sim.elements, sim.state, 1).twist, stored, 1e-9 * stored) << steps;
+    EXPECT_NEAR(work, stored, 1e-6 * stored) << steps; // of -snes_rtol
+  }
+}
+
 TEST(TwistBarrier, IsNotSteppedOver) {
   for (const Measure measure : {Measure::tan, Measure::angle}) {
     Rod rod = straightRod(4, measure);

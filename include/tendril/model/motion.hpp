@@ -41,8 +41,10 @@ struct Motion {
   Vec3 rotationVectorAt(double time) const; ///< [rad]
   Mat3 rotationAt(double time) const;
   Vec3 angularVelocityAt(double time) const; ///< where it jumps, that before [rad/s]
-  /// Sum of the rotation vectors of its parts between two times, each of less than half a radian: whole turns are
-  /// counted [rad].
+  /// Times from one, left out, to another, before or after it: between two it turns by less than half a radian, so that
+  /// whole turns can be counted.
+  std::vector<double> stopsBetween(double from, double to) const;
+  /// Sum of the rotation vectors of its parts between two times: whole turns are counted [rad].
   Vec3 turnBetween(double from, double to) const;
   /// The latest time up to another, later one until which it goes straight and turns by less than half a radian.
   double evenUntil(double from, double to) const;
