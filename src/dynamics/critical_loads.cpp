@@ -87,6 +87,15 @@ PetscErrorCode TimeLoop::locateNext(const State &start, const Step &step, Critic
   low.parameter = start.time;
   low.state = start;
   PetscCall(locateCritical(solver_, step, follow, low, step.time, std::abs(step.time), located_, point, found));
+  constexpr double early = 0.1; // of the way: a short one leaves the factor as many digits
+  for (double high = step.time; *found && point->load_factor - start.time < early * (high - start.time);) {
+    CriticalPoint again;
+    bool same;
+    high = 2 * point->load_factor - start.time;
+    PetscCall(locateCritical(solver_, step, follow, low, high, std::abs(high), located_, &again, &same));
+    if (!same) break;
+    *point = std::move(again);
+  }
   PetscFunctionReturn(0);
 }
 
