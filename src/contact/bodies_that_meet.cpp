@@ -117,53 +117,55 @@ void TouchingBodies::cover(const Configuration &c, int r) const {
   take();
 }
 
-/// All edges are looked at for every body that may be near: what bodies there are is few.
-void TouchingBodies::take() const {
-  pairs_ = {};
+/// Adds a pair, of which the later rod has the first side.
+void TouchingBodies::addPair(int rod, int edge, std::array<int, 2> slot, int to_rod, int to_edge,
+                             std::array<int, 2> to_slot) const {
+  if (rod < to_rod) {
+    std::swap(rod, to_rod);
+    std::swap(edge, to_edge);
+    std::swap(slot, to_slot);
+  }
+  pairs_.items.push_back({rod, edge, to_rod, to_edge, {slot[0], slot[1], to_slot[0], to_slot[1]}});
+}
+
+/// Adds what a body may touch: edges, and the bodies before it.
+void TouchingBodies::takePairsOf(int b) const {
   const Configuration &c = start_;
-  auto add = [&](int rod, int edge, std::array<int, 2> slot, int to_rod, int to_edge, std::array<int, 2> to_slot) {
-    if (rod < to_rod) {
-      std::swap(rod, to_rod);
-      std::swap(edge, to_edge);
-      std::swap(slot, to_slot);
-    }
-    pairs_.items.push_back({rod, edge, to_rod, to_edge, {slot[0], slot[1], to_slot[0], to_slot[1]}});
+  const Solid &solid = solids_[std::size_t(b)];
+  const JoinedBody &body = elements_.body(b);
+  const Collider::Pose pose = poseOf(b, c);
+  const Vec3 centre = c.positionAt(body.position);
+  const double room = body_room_[std::size_t(b)];
+  auto isNear = [&](const Vec3 &x, double size) {
+    if ((x - centre).norm() > solid.reach + size + room) return false;
+    return distanceAt(*solid.shape, pose.toLocal(x)) <= size + room;
   };
-  for (int b = 0; b < int(solids_.size()); ++b) {
-    const Solid &solid = solids_[std::size_t(b)];
-    if (!solid.shape) continue;
-    const JoinedBody &body = elements_.body(b);
-    const Collider::Pose pose = poseOf(b, c);
-    const Vec3 centre = c.positionAt(body.position);
-    const double room = body_room_[std::size_t(b)];
-    auto isNear = [&](const Vec3 &x, double size) {
-      if ((x - centre).norm() > solid.reach + size + room) return false;
-      return distanceAt(*solid.shape, pose.toLocal(x)) <= size + room;
-    };
-    for (int r = 0; r < int(scene_.rods.size()); ++r) {
-      const ContactSettings &contact = scene_.rods[std::size_t(r)].contact;
-      if (!contact.touchesBodies()) continue;
-      const RodRange &rod = elements_.rods[std::size_t(r)];
-      const double away = aboutAxis(r, c) + NormalLaw(contact, contact.stiffness).reach() +
-                          skins_[std::size_t(r)].gain() * rod_room_[std::size_t(r)];
-      for (int i = 0; i < rod.edges; ++i) {
-        const Vec3 along = c.edges<double>(rod.slot(i));
-        if (isNear(c.positionAt(rod.slot(i)) + 0.5 * along, 0.5 * along.norm() + away) && mayTouch(r, i, b))
-          add(r, i, {rod.slot(i), rod.slot((i + 1) % rod.vertices)}, body.rod, TouchingPair::ofBody(b),
-              {body.position, body.rotation});
-      }
-    }
-    for (int other = 0; other < b; ++other) {
-      if (!mayTouch(b, other)) continue;
-      const JoinedBody &to = elements_.body(other);
-      const double width =
-          0.5 * (scene_.bodies[std::size_t(b)].contact.distance + scene_.bodies[std::size_t(other)].contact.distance);
-      if (isNear(c.positionAt(to.position), solids_[std::size_t(other)].reach + width + body_room_[std::size_t(other)]))
-        add(body.rod, TouchingPair::ofBody(b), {body.position, body.rotation}, to.rod, TouchingPair::ofBody(other),
-            {to.position, to.rotation});
+  for (int r = 0; r < int(scene_.rods.size()); ++r) {
+    const ContactSettings &contact = scene_.rods[std::size_t(r)].contact;
+    if (!contact.touchesBodies()) continue;
+    const RodRange &rod = elements_.rods[std::size_t(r)];
+    const double away = aboutAxis(r, c) + NormalLaw(contact, contact.stiffness).reach() +
+                        skins_[std::size_t(r)].gain() * rod_room_[std::size_t(r)];
+    for (int i = 0; i < rod.edges; ++i) {
+      const Vec3 along = c.edges<double>(rod.slot(i));
+      if (isNear(c.positionAt(rod.slot(i)) + 0.5 * along, 0.5 * along.norm() + away) && mayTouch(r, i, b))
+        addPair(r, i, {rod.slot(i), rod.slot((i + 1) % rod.vertices)}, body.rod, TouchingPair::ofBody(b),
+                {body.position, body.rotation});
     }
   }
-  pairs_.sort(scene_.rods.size());
+  for (int other = 0; other < b; ++other) {
+    if (!mayTouch(b, other)) continue;
+    const JoinedBody &to = elements_.body(other);
+    const double width =
+        0.5 * (scene_.bodies[std::size_t(b)].contact.distance + scene_.bodies[std::size_t(other)].contact.distance);
+    if (isNear(c.positionAt(to.position), solids_[std::size_t(other)].reach + width + body_room_[std::size_t(other)]))
+      addPair(body.rod, TouchingPair::ofBody(b), {body.position, body.rotation}, to.rod, TouchingPair::ofBody(other),
+              {to.position, to.rotation});
+  }
+}
+
+/// Numbers the pairs, with their laws and samples, and notes which follow each other along a rod.
+void TouchingBodies::numberPairs() const {
   laws_.clear();
   points_of_.clear();
   next_.clear();
@@ -189,6 +191,15 @@ void TouchingBodies::take() const {
     next_[std::size_t(number)] = found->second;
     before_[std::size_t(found->second)] = number;
   }
+}
+
+/// All edges are looked at for every body that may be near: what bodies there are is few.
+void TouchingBodies::take() const {
+  pairs_ = {};
+  for (int b = 0; b < int(solids_.size()); ++b)
+    if (solids_[std::size_t(b)].shape) takePairsOf(b);
+  pairs_.sort(scene_.rods.size());
+  numberPairs();
 }
 
 } // namespace tendril

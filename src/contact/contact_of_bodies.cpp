@@ -1,5 +1,5 @@
 /// Contact of rigid bodies with rods and with each other: samples of the ones against the others as solids, with
-/// friction at their surfaces (docs/theory.md, Contact between rods).
+/// friction at their surfaces (docs/theory.md, 20).
 #include "tendril/contact/pair_friction.hpp"
 #include "tendril/contact/touching_bodies.hpp"
 #include "tendril/coupling/couplings.hpp"
@@ -179,7 +179,8 @@ private:
   }
 
   /// Derivatives of weight W(distance) of u = exp(-d)(x - p), the place of the sample as the solid sees it, which turns
-  /// by d about p: of second order g.u has what x does, that of the arm x - p, and -d x (dx - dp).
+  /// by d about p: of second order g.u has what x does, that of the arm x - p, and -d x (dx - dp), docs/theory.md
+  /// (20.2).
   void addNormal(const TouchingPair &p, const TouchingSolid &t, const Configuration &c, HessianKind kind,
                  OfPair &d) const {
     const int own = OfPair::half * t.side, other = OfPair::half * t.solid();

@@ -101,18 +101,20 @@ bool Neighbours::mayTouch(int rod, int edge, int to_rod, int to_edge) const {
          });
 }
 
+/// How far from the ways of its vertices a rod may touch another, with half of what its law reaches [m].
+double Neighbours::reachOf(const Room &room, int rod) const {
+  const std::size_t r = std::size_t(rod);
+  return scene_.rods[r].contact.radius + 0.25 * width_[r] + room.beyond[r];
+}
+
 Box Neighbours::boxOf(const Room &room, int rod, int edge) const {
   const RodRange &range = elements_.rods[std::size_t(rod)];
-  const std::size_t a = std::size_t(range.first_vertex + edge),
-                    b = std::size_t(range.first_vertex + (edge + 1) % range.vertices);
-  const double about = scene_.rods[std::size_t(rod)].contact.radius + 0.25 * width_[std::size_t(rod)] +
-                       std::max(room.beyond[a], room.beyond[b]);
   Box box;
-  for (const std::size_t v : {a, b}) {
-    box.include(room.start[v]);
-    box.include(Vec3(room.start[v] + room.way[v]));
+  for (const int s : {range.slot(edge), range.slot((edge + 1) % range.vertices)}) {
+    box.include(room.startOf(s));
+    box.include(room.endOf(s));
   }
-  return box.widened(about);
+  return box.widened(reachOf(room, rod));
 }
 
 bool Neighbours::isNear(const Room &room, int rod, int edge, int to_rod, int to_edge) const {
@@ -126,13 +128,13 @@ bool Neighbours::isNear(const Room &room, int rod, int edge, int to_rod, int to_
     const int e = side == 0 ? edge : to_edge;
     double most = 0;
     for (const int end : {0, 1}) {
-      const std::size_t v = std::size_t(range.first_vertex + (e + end) % range.vertices),
-                        k = std::size_t(2 * side + end);
-      way[k] = room.way[v];
-      x[k] = room.start[v] + (together ? 0 : 0.5) * way[k];
-      most = std::max(most, room.beyond[v] + (together ? 0 : 0.5 * way[k].norm()));
+      const int s = range.slot((e + end) % range.vertices);
+      const std::size_t k = std::size_t(2 * side + end);
+      way[k] = room.wayOf(s);
+      x[k] = room.startOf(s) + (together ? 0 : 0.5) * way[k];
+      most = std::max(most, together ? 0 : 0.5 * way[k].norm());
     }
-    beyond += most;
+    beyond += room.beyond[std::size_t(side == 0 ? rod : to_rod)] + most;
   }
   if (together) { // the one from the other no farther than the edges between let it
     const double between = alongRod(rod, edge, to_edge) + lengthOf(rod, edge) + lengthOf(rod, to_edge);
@@ -161,8 +163,8 @@ TouchingPair Neighbours::pairOf(int rod, int edge, int to_rod, int to_edge) cons
 bool Neighbours::isStraight(const Room &room, int rod, int begin, int end) const {
   const RodRange &range = elements_.rods[std::size_t(rod)];
   const ContactSettings &contact = scene_.rods[std::size_t(rod)].contact;
-  const auto at = [&](int i) { return std::size_t(range.first_vertex + i % range.vertices); };
-  const Vec3 along = room.start[at(end)] - room.start[at(begin)];
+  const auto at = [&](int i) { return range.slot(i % range.vertices); };
+  const Vec3 along = room.startOf(at(end)) - room.startOf(at(begin));
   const double length = along.norm();
   if (!(length > 0)) return false;
   const double closest_ends = 2 * contact.radius + 0.5 * width_[std::size_t(rod)],
@@ -170,7 +172,7 @@ bool Neighbours::isStraight(const Room &room, int rod, int begin, int end) const
                least = room.bend[std::size_t(rod)] + closest_ends / apart;
   if (least > 1) return false;
   for (int i = begin; i < end; ++i) {
-    const Vec3 edge = room.start[at(i + 1)] - room.start[at(i)], more = room.way[at(i + 1)] - room.way[at(i)];
+    const Vec3 edge = room.startOf(at(i + 1)) - room.startOf(at(i)), more = room.wayOf(at(i + 1)) - room.wayOf(at(i));
     const double now = edge.dot(along), then = now + more.dot(along);
     if (!(std::min(now, then) > least * length * lengthOf(rod, i % range.edges))) return false;
   }
@@ -181,18 +183,76 @@ namespace {
 
 constexpr int chunk_edges = 8;
 
-/// Neighbouring edges of a rod, and the box in which they may be.
-struct Chunk {
-  int rod, begin, end;
-  Box box;
-};
-
 /// A chunk in one cell of the grid.
 struct InCell {
   std::uint64_t cell;
   int chunk;
   bool operator<(const InCell &other) const { return std::pair(cell, chunk) < std::pair(other.cell, other.chunk); }
 };
+
+/// Cells about as large as most of some boxes, the chunks'.
+class Grid {
+public:
+  explicit Grid(const std::vector<Box> &boxes) {
+    std::vector<double> sizes;
+    for (const Box &box : boxes) {
+      sizes.push_back((box.high - box.low).maxCoeff());
+      all_.include(box);
+    }
+    std::nth_element(sizes.begin(), sizes.begin() + std::ptrdiff_t(sizes.size() / 2), sizes.end());
+    size_ = std::max(sizes[sizes.size() / 2], (all_.high - all_.low).maxCoeff() / most_cells);
+  }
+  std::uint64_t keyOf(const Vec3 &x) const {
+    const auto at = cellAt(x);
+    return keyOf(at[0], at[1], at[2]);
+  }
+  /// All that a box meets, of every box, by cell.
+  std::vector<InCell> cellsOf(const std::vector<Box> &boxes) const;
+
+private:
+  static constexpr int bits = 21, most_cells = 1 << (bits - 1); // along an axis
+  Box all_;
+  double size_; ///< of a cell [m]
+
+  std::array<std::uint64_t, 3> cellAt(const Vec3 &x) const {
+    std::array<std::uint64_t, 3> at;
+    for (int a = 0; a < 3; ++a) at[std::size_t(a)] = std::uint64_t((x[a] - all_.low[a]) / size_);
+    return at;
+  }
+  static std::uint64_t keyOf(std::uint64_t x, std::uint64_t y, std::uint64_t z) {
+    return (x << 2 * bits) | (y << bits) | z;
+  }
+};
+
+std::vector<InCell> Grid::cellsOf(const std::vector<Box> &boxes) const {
+  std::vector<InCell> cells;
+  for (std::size_t k = 0; k < boxes.size(); ++k) {
+    const auto low = cellAt(boxes[k].low), high = cellAt(boxes[k].high);
+    for (std::uint64_t x = low[0]; x <= high[0]; ++x)
+      for (std::uint64_t y = low[1]; y <= high[1]; ++y)
+        for (std::uint64_t z = low[2]; z <= high[2]; ++z) cells.push_back({keyOf(x, y, z), int(k)});
+  }
+  std::sort(cells.begin(), cells.end());
+  return cells;
+}
+
+/// Of the ways of some vertices that follow each other.
+Box boxAbout(const Room &room, int first_slot, int count) {
+  Box box;
+  for (int a = 0; a < 3; ++a) {
+    Pack low(HUGE_VAL), high(-HUGE_VAL);
+    for (int i = 0; i < count; i += lanes) {
+      const Pack start = read<Pack>(room.start[a] + first_slot + i),
+                 end = start + read<Pack>(room.way[a] + first_slot + i);
+      const Pack::mask_type counts = firstLanes(count - i);
+      low = select(counts, min(low, min(start, end)), low);
+      high = select(counts, max(high, max(start, end)), high);
+    }
+    box.low[a] = hmin(low);
+    box.high[a] = hmax(high);
+  }
+  return box;
+}
 
 bool isBefore(const TouchingPair &a, const TouchingPair &b) {
   return std::tuple(a.rod, a.edge, a.to_rod, a.to_edge) < std::tuple(b.rod, b.edge, b.to_rod, b.to_edge);
@@ -211,65 +271,79 @@ bool Neighbours::isApart(const Room &room, int rod, int edge, int to_edge) const
          isStraight(room, rod, a * chunk_edges, range.edges + std::min(chunk_edges, range.edges));
 }
 
-std::vector<TouchingPair> Neighbours::find(const Room &room) const {
-  constexpr int bits = 21, most_cells = 1 << (bits - 1); // along an axis
-  std::vector<Chunk> chunks;
-  std::vector<double> sizes;
-  Box all;
+/// Rods that may touch: themselves, or others whose boxes meet theirs.
+std::vector<char> Neighbours::meeting(const Room &room) const {
+  struct OfRod {
+    int rod;
+    Box box;
+  };
+  std::vector<char> meets(elements_.rods.size(), false);
+  std::vector<OfRod> rods;
+  Box middles;
   for (int r = 0; r < int(elements_.rods.size()); ++r) {
-    const RodRange &rod = elements_.rods[std::size_t(r)];
     const ContactSettings &contact = scene_.rods[std::size_t(r)].contact;
     if (!contact.touchesRods()) continue;
+    meets[std::size_t(r)] = contact.rods == ContactSettings::Rods::all;
+    const RodRange &rod = elements_.rods[std::size_t(r)];
+    rods.push_back({r, boxAbout(room, rod.first_slot, rod.vertices).widened(reachOf(room, r))});
+    middles.include(Vec3(0.5 * (rods.back().box.low + rods.back().box.high)));
+  }
+  Eigen::Index axis = 0; // along which they are farthest apart
+  if (!rods.empty()) (middles.high - middles.low).maxCoeff(&axis);
+  std::stable_sort(rods.begin(), rods.end(),
+                   [&](const OfRod &a, const OfRod &b) { return a.box.low[axis] < b.box.low[axis]; });
+  for (std::size_t i = 0; i < rods.size(); ++i)
+    for (std::size_t j = i + 1; j < rods.size() && rods[j].box.low[axis] <= rods[i].box.high[axis]; ++j) {
+      char &one = meets[std::size_t(rods[i].rod)], &other = meets[std::size_t(rods[j].rod)];
+      if (!(one && other) && rods[i].box.overlaps(rods[j].box)) one = other = true;
+    }
+  return meets;
+}
+
+/// The edges of the rods that may touch, and where they may be.
+std::vector<Neighbours::Chunk> Neighbours::chunksOf(const Room &room) const {
+  const std::vector<char> meets = meeting(room);
+  std::vector<Chunk> chunks;
+  for (int r = 0; r < int(elements_.rods.size()); ++r) {
+    const RodRange &rod = elements_.rods[std::size_t(r)];
+    if (!meets[std::size_t(r)]) continue;
     for (int i = 0; i < rod.edges; i += chunk_edges) {
-      Chunk chunk{r, i, std::min(i + chunk_edges, rod.edges), {}};
-      double beyond = 0;
-      for (int k = chunk.begin; k <= chunk.end; ++k) {
-        const std::size_t v = std::size_t(rod.first_vertex + k % rod.vertices);
-        chunk.box.include(room.start[v]);
-        chunk.box.include(Vec3(room.start[v] + room.way[v]));
-        beyond = std::max(beyond, room.beyond[v]);
-      }
-      chunk.box = chunk.box.widened(contact.radius + 0.25 * width_[std::size_t(r)] + beyond);
-      sizes.push_back((chunk.box.high - chunk.box.low).maxCoeff());
-      all.include(chunk.box);
-      chunks.push_back(chunk);
+      const int end = std::min(i + chunk_edges, rod.edges), last = std::min(end, rod.vertices - 1);
+      Box box = boxAbout(room, rod.slot(i), last - i + 1);
+      if (last < end) box.include(boxAbout(room, rod.first_slot, 1)); // round a ring
+      chunks.push_back({r, i, end, box.widened(reachOf(room, r))});
     }
   }
+  return chunks;
+}
+
+/// Adds the pairs that two chunks have, or one by itself.
+void Neighbours::addPairs(const Room &room, const Chunk &a, const Chunk &b, std::vector<TouchingPair> &pairs) const {
+  const bool same = a.rod == b.rod, itself = same && a.begin == b.begin;
+  if (same && (scene_.rods[std::size_t(a.rod)].contact.rods != ContactSettings::Rods::all ||
+               isApart(room, a.rod, a.begin, b.begin)))
+    return;
+  std::array<Box, chunk_edges> boxes;
+  for (int j = b.begin; j < b.end; ++j) boxes[std::size_t(j - b.begin)] = boxOf(room, b.rod, j);
+  for (int i = a.begin; i < a.end; ++i) {
+    const Box box = boxOf(room, a.rod, i);
+    if (!box.overlaps(b.box)) continue;
+    for (int j = b.begin; j < (itself ? i : b.end); ++j) {
+      if (box.overlaps(boxes[std::size_t(j - b.begin)]) && mayTouch(a.rod, i, b.rod, j) &&
+          isNear(room, a.rod, i, b.rod, j))
+        pairs.push_back(pairOf(a.rod, i, b.rod, j));
+    }
+  }
+}
+
+std::vector<TouchingPair> Neighbours::find(const Room &room) const {
+  const std::vector<Chunk> chunks = chunksOf(room);
   if (chunks.empty()) return {};
-  std::nth_element(sizes.begin(), sizes.begin() + std::ptrdiff_t(sizes.size() / 2), sizes.end());
-  const double cell = std::max(sizes[sizes.size() / 2], (all.high - all.low).maxCoeff() / most_cells);
-  auto cellAt = [&](const Vec3 &x) {
-    std::array<std::uint64_t, 3> at;
-    for (int a = 0; a < 3; ++a) at[std::size_t(a)] = std::uint64_t((x[a] - all.low[a]) / cell);
-    return at;
-  };
-  auto keyOf = [](std::uint64_t x, std::uint64_t y, std::uint64_t z) { return (x << 2 * bits) | (y << bits) | z; };
-  std::vector<InCell> cells;
-  for (std::size_t k = 0; k < chunks.size(); ++k) {
-    const auto low = cellAt(chunks[k].box.low), high = cellAt(chunks[k].box.high);
-    for (std::uint64_t x = low[0]; x <= high[0]; ++x)
-      for (std::uint64_t y = low[1]; y <= high[1]; ++y)
-        for (std::uint64_t z = low[2]; z <= high[2]; ++z) cells.push_back({keyOf(x, y, z), int(k)});
-  }
-  std::sort(cells.begin(), cells.end());
+  std::vector<Box> boxes;
+  for (const Chunk &c : chunks) boxes.push_back(c.box);
+  const Grid grid(boxes);
+  const std::vector<InCell> cells = grid.cellsOf(boxes);
   std::vector<TouchingPair> pairs;
-  auto take = [&](const Chunk &a, const Chunk &b) {
-    const bool same = a.rod == b.rod, itself = same && a.begin == b.begin;
-    if (same && (scene_.rods[std::size_t(a.rod)].contact.rods != ContactSettings::Rods::all ||
-                 isApart(room, a.rod, a.begin, b.begin)))
-      return;
-    std::array<Box, chunk_edges> boxes;
-    for (int j = b.begin; j < b.end; ++j) boxes[std::size_t(j - b.begin)] = boxOf(room, b.rod, j);
-    for (int i = a.begin; i < a.end; ++i) {
-      const Box box = boxOf(room, a.rod, i);
-      if (!box.overlaps(b.box)) continue;
-      for (int j = b.begin; j < (itself ? i : b.end); ++j) {
-        if (box.overlaps(boxes[std::size_t(j - b.begin)]) && mayTouch(a.rod, i, b.rod, j) &&
-            isNear(room, a.rod, i, b.rod, j))
-          pairs.push_back(pairOf(a.rod, i, b.rod, j));
-      }
-    }
-  };
   for (std::size_t begin = 0, end; begin < cells.size(); begin = end) {
     end = begin + 1;
     while (end < cells.size() && cells[end].cell == cells[begin].cell) ++end;
@@ -277,8 +351,8 @@ std::vector<TouchingPair> Neighbours::find(const Room &room) const {
       for (std::size_t j = begin; j <= i; ++j) {
         const Chunk &a = chunks[std::size_t(cells[i].chunk)], &b = chunks[std::size_t(cells[j].chunk)];
         if (!a.box.overlaps(b.box)) continue;
-        const auto first = cellAt(a.box.low.cwiseMax(b.box.low)); // they meet in other cells, too
-        if (keyOf(first[0], first[1], first[2]) == cells[begin].cell) take(a, b);
+        // They meet in other cells, too.
+        if (grid.keyOf(a.box.low.cwiseMax(b.box.low)) == cells[begin].cell) addPairs(room, a, b, pairs);
       }
   }
   std::sort(pairs.begin(), pairs.end(), isBefore);

@@ -99,11 +99,8 @@ std::vector<Meeting> overlapsOfRods(const Scene &scene, const Elements &elements
   std::vector<Meeting> found;
   if (!scene.touchesRods()) return found;
   const Neighbours neighbours(scene, elements);
-  Room room;
-  for (const int slot : elements.vertex_slot) room.start.push_back(c.positionAt(slot));
-  room.way.assign(room.start.size(), Vec3::Zero());
-  room.beyond.assign(room.start.size(), 0);
-  room.bend.assign(scene.rods.size(), 0);
+  Room room(elements.slots, scene.rods.size());
+  for (const int slot : elements.vertex_slot) room.start.setVector(0, slot, c.positionAt(slot));
   for (const TouchingPair &p : neighbours.find(room)) {
     const ContactSettings &a = scene.rods[std::size_t(p.rod)].contact, &b = scene.rods[std::size_t(p.to_rod)].contact;
     const Closest near =

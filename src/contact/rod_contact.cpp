@@ -135,7 +135,7 @@ private:
 
   /// Derivatives of weight W(distance): with n the normal, l the length of the other edge e, and w the parts of the
   /// vertices, those of the distance are w_k n and w_j w_k (1 - n n')/d, less l^2/d times the square of the gradient of
-  /// the nearest part where that is between the other's vertices.
+  /// the nearest part where that is between the other's vertices: docs/theory.md (19.2).
   static void addNormal(const Touching &t, const GapLaw &law, const Vec3 &other, HessianKind kind, OfPair &d) {
     for (int k = 0; k < 4; ++k)
       d.gradient.segment<3>(OfPair::vertex(k)) += t.weight * law.slope * t.part[std::size_t(k)] * t.normal;

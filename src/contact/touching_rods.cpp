@@ -70,7 +70,7 @@ std::vector<TouchingPair> TouchingRods::expected() const {
 }
 
 void TouchingRods::cover(const Configuration &c, int r) const {
-  const bool covered = !room_.start.empty() && isInRoom(c, c, 0, r);
+  const bool covered = room_.start.size() > 0 && isInRoom(c, c, 0, r);
   if (covered) return;
   makeRoom(c, nullptr, 1);
   take(neighbours_.find(room_));
@@ -88,21 +88,17 @@ double TouchingRods::wallOf(const TouchingPair &p) const {
 /// where no way is known, by 60.
 void TouchingRods::makeRoom(const Configuration &start, const Planes *way, double room) const {
   const double turn = (static_ ? 1 : 0.25) * room;
-  room_.start.resize(std::size_t(elements_.vertices()));
-  room_.way.assign(room_.start.size(), Vec3::Zero());
-  room_.beyond.resize(room_.start.size());
-  room_.bend.assign(scene_.rods.size(), turn);
+  if (room_.start.size() == 0) room_ = Room(elements_.slots, scene_.rods.size());
+  std::fill(room_.bend.begin(), room_.bend.end(), turn);
   for (std::size_t r = 0; r < scene_.rods.size(); ++r) {
     const RodRange &rod = elements_.rods[r];
     double most = 0;
-    for (int i = 0; i < rod.vertices; ++i) {
-      const std::size_t v = std::size_t(rod.first_vertex + i);
-      room_.start[v] = start.positionAt(rod.slot(i));
-      if (way) room_.way[v] = way->vector(0, rod.slot(i));
-      most = std::max(most, room_.way[v].norm());
+    for (int s = rod.first_slot; s < rod.vertexEnd(); ++s) {
+      room_.start.setVector(0, s, start.positionAt(s));
+      room_.way.setVector(0, s, way ? way->vector(0, s) : Vec3(Vec3::Zero()));
+      most = std::max(most, room_.wayOf(s).squaredNorm());
     }
-    const double beyond = room * std::max(settings(int(r)).radius, std::min(most, elements_.length(int(r))));
-    std::fill_n(room_.beyond.begin() + rod.first_vertex, rod.vertices, beyond);
+    room_.beyond[r] = room * std::max(settings(int(r)).radius, std::min(std::sqrt(most), elements_.length(int(r))));
   }
 }
 
@@ -115,31 +111,36 @@ void TouchingRods::addRooms(int r, std::vector<Box> &rooms) const {
 
 /// Whether a rod is in its room at a part of the straight way between two configurations.
 bool TouchingRods::isInRoom(const Configuration &from, const Configuration &to, double part, int r) const {
-  const RodRange &rod = elements_.rods[std::size_t(r)];
-  auto moved = [&](int i) {
-    const Vec3 x = from.positionAt(rod.slot(i));
-    return Vec3(x + part * (to.positionAt(rod.slot(i)) - x) - room_.start[std::size_t(rod.first_vertex + i)]);
+  const RodRange &rod = elements_.rods[r];
+  auto moved = [&](int slot) {
+    const Vector3<Pack> x = readVector<Pack>(from.values(), Configuration::position, slot),
+                        y = readVector<Pack>(to.values(), Configuration::position, slot);
+    return Vector3<Pack>(x + (y - x) * Pack(part) - readVector<Pack>(room_.start, 0, slot));
   };
-  double along = 0, all = 0;
-  for (int i = 0; i < rod.vertices; ++i) {
-    const Vec3 &way = room_.way[std::size_t(rod.first_vertex + i)];
-    along += way.dot(moved(i));
-    all += way.squaredNorm();
+  Pack along(0.0), all(0.0);
+  for (int i = 0; i < rod.vertices; i += lanes) {
+    const Vector3<Pack> way = readVector<Pack>(room_.way, 0, rod.slot(i));
+    const Pack::mask_type counts = firstLanes(rod.vertices - i);
+    along += select(counts, way.dot(moved(rod.slot(i))), Pack(0.0));
+    all += select(counts, way.squaredNorm(), Pack(0.0));
   }
-  const double gone = all > 0 ? std::clamp(along / all, 0.0, 1.0) : 0, bend = room_.bend[std::size_t(r)];
-  auto off = [&](int i) { return Vec3(moved(i) - gone * room_.way[std::size_t(rod.first_vertex + i)]); };
-  const bool bends = settings(r).rods == ContactSettings::Rods::all;
-  Vec3 before = off(rod.closed ? rod.vertices - 1 : 0);
-  for (int i = 0; i < rod.vertices; ++i) {
-    const double beyond = room_.beyond[std::size_t(rod.first_vertex + i)];
-    const Vec3 here = off(i);
-    if (!(here.squaredNorm() <= beyond * beyond)) return false;
-    const int edge = i > 0 ? i - 1 : rod.edges - 1; // of an open rod's first vertex nothing has turned
-    const double most = bend * elements_.restLength()[rod.slot(edge)];
-    if (bends && !((here - before).squaredNorm() <= most * most)) return false;
-    before = here;
+  const double gone = sum(all) > 0 ? std::clamp(sum(along) / sum(all), 0.0, 1.0) : 0, bend = room_.bend[std::size_t(r)],
+               beyond = room_.beyond[std::size_t(r)];
+  auto off = [&](int slot) { return Vector3<Pack>(moved(slot) - readVector<Pack>(room_.way, 0, slot) * Pack(gone)); };
+  for (int i = 0; i < rod.vertices; i += lanes)
+    if (any_of(firstLanes(rod.vertices - i) && !(off(rod.slot(i)).squaredNorm() <= Pack(beyond * beyond))))
+      return false;
+  if (settings(r).rods != ContactSettings::Rods::all) return true;
+  for (int i = 0; i < rod.edges; i += lanes) {
+    const int slot = rod.slot(i), count = std::min(rod.edges, rod.vertices - 1) - i; // but for what closes a ring
+    const Pack most = Pack(bend) * read<Pack>(elements_.restLength() + slot);
+    const Vector3<Pack> turned = off(slot + 1) - off(slot);
+    if (count > 0 && any_of(firstLanes(count) && !(turned.squaredNorm() <= most * most))) return false;
   }
-  return true;
+  if (!rod.closed) return true;
+  auto first = [](const Vector3<Pack> &v) { return Vec3(v[0][0], v[1][0], v[2][0]); };
+  const int last = rod.slot(rod.vertices - 1);
+  return (first(off(rod.first_slot)) - first(off(last))).norm() <= bend * elements_.restLength()[last];
 }
 
 void TouchingRods::take(std::vector<TouchingPair> pairs) const {

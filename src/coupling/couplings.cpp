@@ -3,7 +3,7 @@
 namespace tendril {
 namespace {
 
-/// All couplings. A new one needs its line here and nothing else.
+/// All couplings. A new one needs its maker here, declared in couplings.hpp, and nothing else.
 constexpr std::unique_ptr<Term> (*couplings[])(const Scene &, const Elements &) = {
     makePins,    makeTies,        makeRotations, makeRotationsToBodies, makeJoints,
     makeTendons, makeBodyContact, makeContact,   makeRodContact,        makeContactOfBodies};

@@ -197,83 +197,103 @@ PetscErrorCode BucklingPath::begin(State &state, Point *at) {
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode BucklingPath::run(State &state, bool *finished) {
+/// Goes on to a point.
+PetscErrorCode BucklingPath::take(Point &point, Stretch &along, State &state) {
+  along.before = std::move(along.at);
+  along.at = std::move(point);
+  state = along.at.state;
+  ++state.step;
+  along.at.state.step = state.step;
+  return on_step ? on_step(state, along.at.report, along.at.unstable) : PetscErrorCode(0);
+}
+
+/// Looks for the critical loads before a point; where there must be some but none is found, neither is the point.
+PetscErrorCode BucklingPath::look(const Point &at, Point &next) {
+  bool snapped = false;
+  PetscFunctionBeginUser;
+  if (next.found && next.unstable != at.unstable) PetscCall(locateAll(at, next, &snapped));
+  if (snapped)
+    next.report.reason = "stability changes before load factor " + shortText(next.factor) +
+                         ", but no critical load was found; take more -load_steps";
+  next.found = next.found && !snapped;
+  PetscFunctionReturn(0);
+}
+
+/// Where Newton does not reach a load: at a bifurcation it fails, and beyond it goes on; at a limit point the path
+/// ends.
+PetscErrorCode BucklingPath::goAround(const Stretch &along, double target, Point *next, State &state) {
+  PetscFunctionBeginUser;
+  std::vector<Root> roots;
+  Point end;
+  end.factor = target;
+  near_ = {along.at};
+  if (along.before.factor < along.at.factor) near_.push_back(along.before);
+  PetscCall(locate(along.at.unstable, along.at, end, false, true, &roots));
+  if (roots.empty()) PetscFunctionReturn(0);
+  bool turns_back = false;
+  if (roots[0].limit) PetscCall(isLimit(along.at, roots[0].factor, &turns_back));
+  if (turns_back) {
+    state = roots[0].below;
+    PetscCall(note(roots));
+    ending_ = "the load cannot rise beyond the limit point";
+    PetscFunctionReturn(0);
+  }
+  for (double beyond = 1e-3; beyond < 0.05 && !next->found; beyond *= 2)
+    PetscCall(advance(along.at, std::max(target, roots[0].factor) * (1 + beyond), next));
+  PetscCall(look(along.at, *next));
+  PetscFunctionReturn(0);
+}
+
+/// Follows the path until all modes are found, it ends, or fails.
+PetscErrorCode BucklingPath::follow(Stretch &along, State &state, bool *stopped) {
   constexpr int few = 5; // iterations
   constexpr double short_step = 0.02, shortest = 1e-4;
   PetscFunctionBeginUser;
-  *finished = false;
-  Point at, before;
-  PetscCall(begin(state, &at));
-  if (!at.found) {
-    failure_ =
-        "there is no equilibrium to begin with, at load factor " + shortText(at.factor) + ": " + at.report.reason;
-    PetscFunctionReturn(0);
-  }
+  *stopped = false;
+  const Point &at = along.at;
   double h = at.factor < 0.5 * early * settings_.dt ? 100 * at.factor : settings_.dt - at.factor;
-  auto take = [&](Point &point) {
-    before = std::move(at);
-    at = std::move(point);
-    state = at.state;
-    ++state.step;
-    at.state.step = state.step;
-    return on_step ? on_step(state, at.report, at.unstable) : PetscErrorCode(0);
-  };
-  auto look = [&](Point &next) {
-    bool snapped = false;
-    PetscFunctionBeginUser;
-    if (next.found && next.unstable != at.unstable) PetscCall(locateAll(at, next, &snapped));
-    if (snapped)
-      next.report.reason = "stability changes before load factor " + shortText(next.factor) +
-                           ", but no critical load was found; take more -load_steps";
-    next.found = next.found && !snapped;
-    PetscFunctionReturn(0);
-  };
-  {
-    Point first = at;
-    PetscCall(take(first));
-  }
-  while (modes_.count() < count_ && at.factor < settings_.t_end && failure_.empty()) {
-    if (stops && stops()) PetscFunctionReturn(0);
+  while (modes_.count() < count_ && at.factor < settings_.t_end && failure_.empty() && ending_.empty()) {
+    *stopped = stops && stops();
+    if (*stopped) PetscFunctionReturn(0);
     Point next;
     const double target = std::min(at.factor + h, settings_.t_end);
     PetscCall(advance(at, target, &next));
-    PetscCall(look(next));
+    PetscCall(look(at, next));
     if (next.found) {
       if (next.report.iterations <= few) h *= 2;
-      PetscCall(take(next));
+      PetscCall(take(next, along, state));
       continue;
     }
     h *= 0.5;
     if (h > short_step * target) continue;
-    std::vector<Root> roots;
-    Point end;
-    end.factor = target;
-    near_ = {at};
-    if (before.factor < at.factor) near_.push_back(before);
-    PetscCall(locate(at.unstable, at, end, false, true, &roots));
-    bool turns_back = false;
-    if (!roots.empty() && roots[0].limit) PetscCall(isLimit(at, roots[0].factor, &turns_back));
-    if (!roots.empty() && !turns_back) { // Newton fails at a bifurcation, and beyond it goes on
-      for (double beyond = 1e-3; beyond < 0.05 && !next.found; beyond *= 2)
-        PetscCall(advance(at, std::max(target, roots[0].factor) * (1 + beyond), &next));
-      PetscCall(look(next));
-      if (next.found) {
-        PetscCall(take(next));
-        continue;
-      }
-    }
-    if (turns_back) {
-      state = roots[0].below;
-      PetscCall(note(roots));
-      ending_ = "the load cannot rise beyond the limit point";
-      break;
-    }
-    if (h > shortest * target) continue;
-    failure_ = "the path of equilibria could not be followed beyond load factor " + shortText(at.factor) + ": " +
-               next.report.reason;
+    PetscCall(goAround(along, target, &next, state));
+    if (next.found)
+      PetscCall(take(next, along, state));
+    else if (ending_.empty() && h <= shortest * target)
+      failure_ = "the path of equilibria could not be followed beyond load factor " + shortText(at.factor) + ": " +
+                 next.report.reason;
   }
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode BucklingPath::run(State &state, bool *finished) {
+  PetscFunctionBeginUser;
+  *finished = false;
+  Point first;
+  PetscCall(begin(state, &first));
+  if (!first.found) {
+    failure_ =
+        "there is no equilibrium to begin with, at load factor " + shortText(first.factor) + ": " + first.report.reason;
+    PetscFunctionReturn(0);
+  }
+  Stretch along;
+  along.at = first; // and so the one before it
+  PetscCall(take(first, along, state));
+  bool stopped;
+  PetscCall(follow(along, state, &stopped));
+  if (stopped) PetscFunctionReturn(0);
   if (ending_.empty() && modes_.count() < count_ && failure_.empty())
-    ending_ = "the path was followed up to load factor " + shortText(at.factor);
+    ending_ = "the path was followed up to load factor " + shortText(along.at.factor);
   *finished = true;
   PetscFunctionReturn(0);
 }

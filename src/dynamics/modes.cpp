@@ -356,8 +356,7 @@ PetscErrorCode modesAtIterate(StepSolver &solver, Metric metric, int count, Mode
   std::vector<Place> all;
   std::deque<std::array<Planes, 2>> work;
   for (NewtonSolver &block : solver.blocks()) {
-    Planes planes(slot_size, solver.potential().dofs().slots(block.rods()));
-    planes.setOrigin(solver.potential().elements().rods[std::size_t(block.rods().begin)].first_slot);
+    const Planes planes = solver.potential().dofs().makePlanes(block.rods());
     work.push_back({planes, planes});
     for (const RodSet island : block.islands()) {
       IslandModes &one = islands.emplace_back(block, solver.potential(), island, metric, work.back());

@@ -66,6 +66,17 @@ double TimeLoop::longest() const {
 }
 double TimeLoop::shortest() const { return settings_.dt_min > 0 ? settings_.dt_min : longest() / 1024; }
 
+/// The next step, not yet solved.
+TimeLoop::Attempt TimeLoop::attemptFrom(const State &state) const {
+  Attempt now;
+  double landing;
+  now.h = nextStep(state.time, &landing);
+  now.step = stepOf(settings_, state, now.h);
+  if (std::abs(now.step.time - landing) < 1e-9 * now.h) now.step.time = landing;
+  if (!settings_.dynamic) now.step.load_factor = now.step.time;
+  return now;
+}
+
 /// Solves the step. What it leads to is in `next`, block by block where the last stage is the end of the step; the
 /// state is not touched.
 PetscErrorCode TimeLoop::attempt(const State &state, State *next, Attempt *now) {
@@ -214,6 +225,46 @@ void TimeLoop::prepare(const State &state) {
   for (std::size_t k = 0; k < moving_.size(); ++k) moving_of_[moving_[k].rod].push_back(int(k));
 }
 
+/// Has what may touch in the step on one rank, or the scene modelled with more unknowns where the step asks for them:
+/// it is taken `anew` then. The loop `ends` where nothing is left to this rank, or that fails.
+PetscErrorCode TimeLoop::remodel(State &state, State *next, const Attempt &now, bool *anew, bool *ends) {
+  PetscFunctionBeginUser;
+  *anew = *ends = false;
+  if (now.report.meets) {
+    if (now.begins) state.memory.clear(); // of rods that did not know of each other
+    if (now.first) control.energy = NAN;
+    PetscCall(unite(anew));
+    *ends = !*anew;
+  } else if (widen && now.report.converged && !now.too_coarse) {
+    PetscCall(widen(*next, now.report.first_negative_pivots > 0, anew, &failure_));
+    *ends = !failure_.empty();
+    if (*anew && !*ends && now.first) control.energy = NAN;
+  }
+  if (!*anew || *ends) PetscFunctionReturn(0);
+  prepare(state);
+  *next = state;
+  PetscFunctionReturn(0);
+}
+
+/// Looks for a critical point within the step. Where there is one, the state has `moved` there, which adds to `work`,
+/// or the run is `finished`.
+PetscErrorCode TimeLoop::goToCritical(State &state, const Step &step, Work *work, bool *moved, bool *finished) {
+  PetscFunctionBeginUser;
+  const State before = state;
+  *moved = false;
+  PetscCall(locate(state, step, moved));
+  *finished = *moved && settings_.bifurcation == Bifurcation::stop;
+  if (!*moved || *finished) PetscFunctionReturn(0);
+  WorkSums way;
+  addStaticWork(solver_.potential().scene(), solver_.potential().elements(), before, state, way);
+  Tally tally;
+  way.tally(tally);
+  solver_.team().combine(tally);
+  *work += way.value();
+  control.stable = false;
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finished) {
   PetscFunctionBeginUser;
   PetscLogDouble begin, now;
@@ -227,54 +278,25 @@ PetscErrorCode TimeLoop::run(State &state, const Observer &observe, bool *finish
   while (state.time < settings_.t_end) {
     const bool begins = settings_.dynamic && state.memory.empty(); // at the start, and where the state was written
     if (begins) PetscCall(integrator_->begin(solver_, control.dt, state));
-    Attempt step;
-    double landing;
-    step.h = nextStep(state.time, &landing);
-    step.step = stepOf(settings_, state, step.h);
-    if (std::abs(step.step.time - landing) < 1e-9 * step.h) step.step.time = landing;
-    if (!settings_.dynamic) step.step.load_factor = step.step.time;
+    Attempt step = attemptFrom(state);
+    step.begins = begins;
+    step.first = begun_here;
     const Doing here([&](std::ostream &out) {
       out << (settings_.dynamic ? "step at time " : "load step at factor ") << state.time << " of " << settings_.t_end
           << (settings_.dynamic ? ", dt " : ", increment ") << step.h;
       if (rejected > 0) out << ", after " << rejected << " that failed";
     });
     PetscCall(attempt(state, &next, &step));
-    if (step.report.meets) {
-      if (begins) state.memory.clear(); // of rods that did not know of each other
-      if (begun_here) control.energy = NAN;
-      bool stays;
-      PetscCall(unite(&stays));
-      if (!stays) PetscFunctionReturn(0);
-      prepare(state);
-      next = state;
-      continue;
-    }
-    if (widen && step.report.converged && !step.too_coarse) {
-      bool widened = false;
-      PetscCall(widen(next, step.report.first_negative_pivots > 0, &widened, &failure_));
-      if (!failure_.empty()) PetscFunctionReturn(0);
-      if (widened) {
-        if (begun_here) control.energy = NAN;
-        prepare(state);
-        next = state;
-        continue;
-      }
-    }
+    bool anew, ends;
+    PetscCall(remodel(state, &next, step, &anew, &ends));
+    if (ends) PetscFunctionReturn(0);
+    if (anew) continue;
     if (!step.too_coarse && mayPassCritical(state, step.report)) {
-      bool moved = false;
-      const State before = state;
-      PetscCall(locate(state, step.step, &moved));
-      *finished = moved && settings_.bifurcation == Bifurcation::stop;
+      bool moved;
+      PetscCall(goToCritical(state, step.step, &work, &moved, finished));
       if (*finished) PetscFunctionReturn(0);
       if (moved) {
-        WorkSums way;
-        addStaticWork(solver_.potential().scene(), solver_.potential().elements(), before, state, way);
-        Tally tally;
-        way.tally(tally);
-        solver_.team().combine(tally);
-        work += way.value();
         next = state;
-        control.stable = false;
         continue;
       }
     }

@@ -5,7 +5,7 @@
 namespace tendril {
 namespace {
 
-/// Of a muscle its potential p (L^3/b^2 - L) b^2/(4 pi n^2), and the factor alone.
+/// Of a muscle its potential p (L^3/b^2 - L) b^2/(4 pi n^2), docs/theory.md (10.7): its factor, and the rest.
 double muscleFactor(const Actuator &a, double pressure) {
   const double beyond = std::max(0.0, pressure - a.minimum_pressure);
   return beyond * a.braid_length * a.braid_length / (4 * pi * a.turns * a.turns);
@@ -48,6 +48,7 @@ Pull pullOf(const Actuator &a, double x, double input, const TendonDamper &dampe
   if (!(stiffness > 0)) return {};
   const double tension = a.stiffness * (x - input) + damping * (x - damper.rest);
   if (tension <= 0 && !a.compression && !taut) return {};
+  // docs/theory.md (10.6).
   return {0.5 * tension * tension / stiffness, tension, stiffness};
 }
 

@@ -45,7 +45,7 @@ public:
     }
   }
 
-  /// Dissipation is a second quadratic, as in BendTwist.
+  /// Dissipation is a second quadratic, as in BendTwist: docs/theory.md (14.2).
   void beginStep(const State &, const Configuration &start, const Step &step, int r) override {
     const double beta = scene_.rods[r].material.stiffness_damping_coefficient;
     if (!elements_.rods[r].isReduced() || beta == 0) return;
@@ -94,7 +94,7 @@ private:
   }
 
   /// 1/2 sum k_a (n_a y - r_a)^2 over the two directors, but for a constant, with n_a the normal along each: 1/2 k
-  /// (y - r)^2, k = sum k_a n_a^2, r = sum k_a n_a r_a/k.
+  /// (y - r)^2, k = sum k_a n_a^2, r = sum k_a n_a r_a/k, docs/theory.md (5.1).
   template <class Rest> void setLaw(int r, const Rest &rest_of, double q) {
     for (const LooseCell &cell : cellsOf(elements_, r)) {
       const int s = cell.slot;

@@ -10,9 +10,9 @@ public:
   BendTwist(const Scene &scene, const Elements &elements)
       : scene_(scene), elements_(elements), cells_(elements.cells()) {}
 
-  /// Dissipation proportional to stiffness is a second quadratic in the same strains: stiffness k and rest r with
-  /// damping ratio q = beta/dt around the strain s at the start (dampedRest) combine into stiffness k (1 + q) and rest
-  /// (r + q s)/(1 + q).
+  /// Dissipation proportional to stiffness is a second quadratic in the same strains, docs/theory.md (14.2): stiffness
+  /// k and rest r with damping ratio q = beta/dt around the strain s at the start (dampedRest) combine into stiffness k
+  /// (1 + q) and rest (r + q s)/(1 + q).
   void beginStep(const State &, const Configuration &start, const Step &step, int r) override {
     const double beta = scene_.rods[r].material.stiffness_damping_coefficient;
     if (beta == 0 || elements_.rods[r].isReduced()) return;

@@ -1,5 +1,6 @@
-/// Weight, loads and inertia of rigid bodies: of the centre of mass as of a vertex, and the balance of angular momentum
-/// in axes fixed in space, for which the work since the last iterate stands in place of a potential.
+/// Weight, loads and inertia of rigid bodies: of the centre of mass as of a vertex, docs/theory.md (15.2), and the
+/// balance of angular momentum in axes fixed in space (9.2), for which the work since the last iterate (9.5) stands in
+/// place of a potential.
 #include "tendril/energy/term.hpp"
 #include "tendril/state/spin_stage.hpp"
 
@@ -50,7 +51,7 @@ public:
       if (!scene_.bodies[b.body].force.isZero(0))
         sum -= factor_ * scene_.bodies[b.body].force.dot(ownCentre(b, c) - ownCentre(b, *start_));
       if (dynamic_) sum += 0.5 * m.weight * (moved - m.predicted).squaredNorm();
-      // Exact slope at the iterate, and an error of the third power of the turn (Load has the same for couples).
+      // (9.5): exact slope at the iterate, and an error of the third power of the turn (Load has the same for couples).
       sum += 0.5 * rotationBetween(m.iterate, c.frameAt(b.rotation)).dot(m.couple + coupleOn(b, c));
     }
     return sum;
@@ -95,7 +96,7 @@ public:
   }
 
   /// The symmetric blocks are those of the coordinates exp(d) R, in which the gradient of a couple rho is rho + (its
-  /// derivative + [rho]x/2) d: so is the rest.
+  /// derivative + [rho]x/2) d, docs/theory.md (9.4): so is the rest.
   Vec3 circulation(const JoinedBody &b, const Configuration &c) const override {
     const Vec3 couple = coupleOn(b, c);
     if (!dynamic_) return 0.5 * couple;

@@ -5,6 +5,7 @@
 
 namespace tendril {
 
+/// docs/theory.md (10.9).
 CapstanLaw::CapstanLaw(double u, double exponent, double slip) {
   const double most = u < 0 ? -std::expm1(-exponent) : std::expm1(exponent), v = std::abs(u) / slip;
   const bool slides = v >= 1;

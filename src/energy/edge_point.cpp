@@ -20,8 +20,8 @@ std::array<ByEdge, 2> byEdges(const EdgePoint &point, const Configuration &c) {
   return by;
 }
 
-/// A force at the axis of an edge. A quadratic form A of its place is (1 - s) A(x_i) + s A(x_{i+1}) - s (1 - s)
-/// A(e_i): nothing that joins vertices.
+/// A force at the axis of an edge, docs/theory.md (17.5). A quadratic form A of its place is (1 - s) A(x_i) + s
+/// A(x_{i+1}) - s (1 - s) A(e_i): nothing that joins vertices.
 void addOnAxis(double at, int slot, int next, const Vec3 &gradient, const Mat3 &hessian, const BlockPlanes *blocks,
                Derivatives &out) {
   for (int a = 0; a < 3; ++a) {

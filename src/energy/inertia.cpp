@@ -12,7 +12,8 @@ public:
       : scene_(scene), elements_(elements), predicted_(slot_size, elements.slots), weight_(scene.rods.size()) {}
 
   /// With v = d/dt + u and acceleration (mass v + b)/dt (StageRule), inertia and dissipation are m (mass/dt^2 +
-  /// alpha/dt) (d - d_hat), d_hat = -dt u - b dt/(mass + alpha dt); the same for the twist increment.
+  /// alpha/dt) (d - d_hat), d_hat = -dt u - b dt/(mass + alpha dt), docs/theory.md (15.2); the same for the twist
+  /// increment, whose derivatives are (14.3).
   void beginStep(const State &, const Configuration &start, const Step &step, int r) override {
     start_ = &start;
     reference_ = step.twist_reference ? step.twist_reference : &start;

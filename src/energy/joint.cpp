@@ -9,8 +9,8 @@ namespace {
 constexpr int child = 0, child_spin = 3, parent = 6, parent_spin = 9; // first variables
 
 /// s.w of a direction s of the parent and a vector w that turns with the child; and where `from_point`, w is that from
-/// the parent's centre of mass to the child's point, less what the parent's own point has. With ds = d x s the second
-/// derivatives by both spins d, e: (d x s).(e x b) = (d.e)(s.b) - (d.b)(e.s).
+/// the parent's centre of mass to the child's point, less what the parent's own point has: docs/theory.md (12.1),
+/// (12.2). By both spins d of w and e of s: (e x s).(d x b) = (d.e)(s.b) - (e.b)(d.s).
 JointRow product(const Vec3 &s, const Vec3 &w, const Vec3 &arm, bool from_point) {
   JointRow row;
   row.value = s.dot(w);
@@ -38,8 +38,8 @@ JointRow pointRow(const JointPlace &p, int k) {
   return row;
 }
 
-/// The same along an axis of the world, where all of the point is held: turns of the parent alone change nothing then,
-/// not even to second order.
+/// The same along an axis of the world, where all of the point is held, docs/theory.md (12.3): turns of the parent do
+/// not turn the axis.
 JointRow heldPointRow(const JointPlace &p, int k) {
   const Vec3 s = Vec3::Unit(k);
   JointRow row;
@@ -221,7 +221,7 @@ void JointLaw::addSprings(const Joint &joint, const Rows &values, double target)
     value += radialLaw(spring, distance.norm()).value;
     slope.head<3>() += of_point.gradient;
     curvature.topLeftCorner<3, 3>() += of_point.hessian;
-    if (holds(joint, cosine_row)) { // stiffness/2 times the square of the angle
+    if (holds(joint, cosine_row)) { // stiffness/2 times the square of the angle, (12.5)
       const double c = std::clamp(values[cosine_row], -1.0, 1.0), angle = std::acos(c), sine = std::sin(angle),
                    square = angle * angle;
       const bool small = square < 1e-4; // by power series

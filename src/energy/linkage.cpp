@@ -67,6 +67,19 @@ static double turnAbout(const Mat3 &rotation, const Vec3 &axis) {
   return 2 * std::atan2(q.vec().dot(axis), q.w());
 }
 
+/// The turn that a frame makes to where it is afterwards, as a rotation vector near another one, so that more than half
+/// a turn counts as such.
+static Vec3 turnNear(const Vec3 &about, const Frame &before, const Mat3 &turned) {
+  const Frame after{turned.col(0), turned.col(1), 1};
+  Vec3 turn = rotationBetween(before, after);
+  const double angle = turn.norm();
+  if (angle > 0) {
+    const Vec3 along = turn / angle;
+    turn += 2 * pi * std::round((about.dot(along) - angle) / (2 * pi)) * along;
+  }
+  return turn;
+}
+
 /// With T what a body has turned by since it was drawn, a joint has T_child = T_parent exp(axis q), and the child's
 /// point as far from the parent's, in the parent's axes, as it slides.
 void Linkage::follow(const TreeJoint &link, const Configuration &from, const Planes &increment, double scale) const {
@@ -113,26 +126,15 @@ void Linkage::follow(const TreeJoint &link, const Configuration &from, const Pla
     if (k < 2 ? held.across : held.along) gap[k] = 0;
   if (held.slidesFreely()) gap[2] = counted;
   const Vec3 off = parent_turned * joint.axes * gap;
-  auto turnFrom = [&](int slot, const Mat3 &turned, const Vec3 &about) {
-    // As a rotation vector near that of the increments, so that more than half a turn counts as such.
-    const Frame after{turned.col(0), turned.col(1), 1};
-    Vec3 turn = rotationBetween(from.frameAt(slot), after);
-    const double angle = turn.norm();
-    if (angle > 0) {
-      const Vec3 along = turn / angle;
-      turn += 2 * pi * std::round((about.dot(along) - angle) / (2 * pi)) * along;
-    }
-    return turn;
-  };
   if (!link.places_parent) {
     const Mat3 turned = parent.turned * relative;
     const Mat3 turn = turned * from.rotationAt(pair.of[1]).transpose();
     moves_[std::size_t(joint.child)] = {parent.point + off - parent_point - (turn * place.arm - place.arm),
-                                        turnFrom(pair.of[1], turned, moveOf(joint.child).turn)};
+                                        turnNear(moveOf(joint.child).turn, from.frameAt(pair.of[1]), turned)};
   } else {
     const Mat3 turn = parent_turned * from.rotationAt(pair.of[3]).transpose();
     moves_[std::size_t(joint.parent)] = {child.point - off - (turn * place.parent_arm - place.parent_arm),
-                                         turnFrom(pair.of[3], parent_turned, moveOf(joint.parent).turn)};
+                                         turnNear(moveOf(joint.parent).turn, from.frameAt(pair.of[3]), parent_turned)};
   }
 }
 

@@ -1,5 +1,5 @@
-/// Stretching of the edges, with the axial force optionally an unknown of its own (Hellinger-Reissner), condensed edge
-/// by edge.
+/// Stretching of the edges, docs/theory.md (2.1) and (2.2), with the axial force optionally an unknown of its own
+/// (Hellinger-Reissner), condensed edge by edge (23.1).
 #include "tendril/energy/edge.hpp"
 #include "tendril/energy/term.hpp"
 
@@ -85,11 +85,12 @@ AxialLaw::AxialLaw(const Scene &scene, const Elements &elements)
   std::copy_n(elements.axialStiffness(), elements.slots, planes_[0]);
 }
 
-/// Dissipation as in the bending term: a second quadratic around the strain at the start (dampedRest). For a force that
-/// does the work which the edge stores, a step takes the mean of the strains at its ends and the slope of the strain
-/// between them. Known from a solve before, in which the edge moves by de on either side of its middle m, what the mean
-/// has on top of the strain in the middle is a rest strain: |de|^2/(2 L^2) for `seed`; for `classical`, with the mean l
-/// of the lengths at the ends, (l - |m|)/L, and the force is along m/l, not m/|m|.
+/// Dissipation as in the bending term: a second quadratic around the strain at the start (dampedRest), docs/theory.md
+/// (14.2). For a force that does the work which the edge stores, a step takes the mean of the strains at its ends and
+/// the slope of the strain between them. Known from a solve before, in which the edge moves by de on either side of its
+/// middle m, what the mean has on top of the strain in the middle is a rest strain with the opposite sign: |de|^2/(2
+/// L^2) for `seed` (15.12); for `classical`, with the mean l of the lengths at the ends, (l - |m|)/L, and the force is
+/// along m/l, not m/|m| (15.13).
 void AxialLaw::beginStep(const Configuration &start, const Step &step, int r) {
   const double beta = scene_.rods[r].material.stiffness_damping_coefficient;
   const Rates *half = step.rule ? step.rule->half : nullptr;

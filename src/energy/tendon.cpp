@@ -176,7 +176,8 @@ TendonPath::Derivatives TendonPath::derivatives(const Configuration &c, bool sec
 }
 
 /// With w the place of an end x as the body sees that it winds round, exp(-d) (x - p), its derivatives are those of
-/// x - p and w x d; of second order g.w has what x has, that of the arm w, and -d x (dx - dp).
+/// x - p and w x d, docs/theory.md (20.1), (20.2); of second order g.w has what x has, that of the arm w, and -d x (dx
+/// - dp).
 void TendonPath::addSegment(int segment, const Configuration &c, bool second, const TensionsAlong *along,
                             Derivatives &out) const {
   const Tendon::Segment &s = tendon().segments[std::size_t(segment)];

@@ -11,7 +11,7 @@ Distance fromCentre(const Vec3 &between, const Mat3 &across, double radius) {
   return {d - radius, n, (across - n * n.transpose()) / d};
 }
 
-/// With the distances a from one family of faces and b from another.
+/// With the distances a from one family of faces and b from another: docs/theory.md (17.10), (17.11).
 Distance outsideBoth(const Distance &a, const Distance &b) {
   if (a.value <= 0 || b.value <= 0) return a.value >= b.value ? a : b;
   const double d = std::hypot(a.value, b.value), x = a.value / d, y = b.value / d;

@@ -52,6 +52,15 @@ struct Contents {
   std::size_t strain_row = 0;
 };
 
+template <class Archive, class AnyState, class Whole> void exchangeBodies(Archive &a, AnyState &s, const Whole &whole) {
+  std::size_t count = s.body_rate.size();
+  whole("bodies", count, 1e15);
+  a.array("body_position", s.body_position, count);
+  a.array("body_position_low", s.body_position_low, count);
+  a.array("body_rate", s.body_rate, count);
+  for (int n = 0; n < int(s.memory.size()); ++n) a.array("memory_body_" + std::to_string(n), s.memory[n].body, count);
+}
+
 template <class Archive, class AnyContents> void exchange(Archive &a, AnyContents &c, const Elements &elements) {
   auto whole = [&](const char *name, auto &value, [[maybe_unused]] double most) {
     if constexpr (Archive::reads)
@@ -60,22 +69,20 @@ template <class Archive, class AnyContents> void exchange(Archive &a, AnyContent
       a.number(name, double(value));
   };
   auto &s = c.state;
-  auto &k = c.control;
   a.number("time", s.time);
   whole("step", s.step, 1e15);
-  a.number("next_dt", k.dt);
-  whole("good_steps", k.good, 2e9);
-  whole("stable", k.stable, 1);
-  a.number("step_error", k.error);
-  a.number("error_sum", k.error_sum);
-  a.number("rounding_sum", k.rounding_sum);
-  a.number("energy", k.energy);
+  a.number("next_dt", c.control.dt);
+  whole("good_steps", c.control.good, 2e9);
+  whole("stable", c.control.stable, 1);
+  a.number("step_error", c.control.error);
+  a.number("error_sum", c.control.error_sum);
+  a.number("rounding_sum", c.control.rounding_sum);
+  a.number("energy", c.control.energy);
   a.number("last_dt", s.last_dt);
   a.number("dt_before", s.dt_before);
   std::size_t cells = c.cells.size(), twists = c.twists.size(), memory = s.memory.size(), strains = s.strains.size();
-  const double vertices = elements.vertices();
-  whole("cells", cells, 3 * vertices);
-  whole("cells_with_twist", twists, 3 * vertices);
+  whole("cells", cells, 3.0 * elements.vertices());
+  whole("cells_with_twist", twists, 3.0 * elements.vertices());
   whole("remembered_rates", memory, most_memory);
   whole("remembered_strains", strains, 1e15);
   whole("strain_row", c.strain_row, 1e15);
@@ -105,12 +112,7 @@ template <class Archive, class AnyContents> void exchange(Archive &a, AnyContent
   if (a.format_version >= 5) exchangeContacts(a, s, whole);
   list(6, "junction_groups", "junction_axes", s.junction_axes);
   if (a.format_version < 7) return;
-  std::size_t bodies = s.body_rate.size();
-  whole("bodies", bodies, 1e15);
-  a.array("body_position", s.body_position, bodies);
-  a.array("body_position_low", s.body_position_low, bodies);
-  a.array("body_rate", s.body_rate, bodies);
-  for (std::size_t n = 0; n < memory; ++n) a.array("memory_body_" + std::to_string(n), s.memory[n].body, bodies);
+  exchangeBodies(a, s, whole);
   list(8, "joints", "joints", s.joints);
   list(9, "rods_that_touch_rods", "rod_contact_stiffness", s.rod_contact_stiffness);
   if (a.format_version >= 10) exchangePairs(a, s, whole);

@@ -124,6 +124,58 @@ void readRotation(YamlMap &map, const Rod &rod, Constraint &c) {
                      "' as drawn, too near to half a turn; turn it by a 'motion', or write 'measure: sine'");
 }
 
+/// Stiffness, damping and what goes with them.
+void readSpring(YamlMap &map, const YamlValue &value, bool to_vertex, Constraint &c) {
+  if (!map.has("constraints[].stiffness")) {
+    map.refuseUnknown();
+    value.fail("'stiffness' is missing; to " +
+               (to_vertex ? "make two vertices one point exactly, write a junction of 'type: ball'"
+                          : "hold a " + std::string(c.isPin() ? "vertex" : "frame") +
+                                " exactly, write a support of 'type: " + (c.isPin() ? "pin" : "clamp") + "'"));
+  }
+  c.stiffness = map.number("constraints[].stiffness");
+  c.damping = map.number("constraints[].damping");
+  c.saturation = map.number("constraints[].saturation");
+  c.damps_motion = !map.flag("constraints[].update_old_target");
+  if (c.stiffness == 0 && c.damping == 0) value.fail("'stiffness' and 'damping' are both zero: nothing is constrained");
+  if (c.saturation == 0)
+    map.at("constraints[].saturation").fail("'saturation' must be positive, or negative for none; found 0");
+}
+
+void readMotionOf(YamlMap &map, Constraint &c) {
+  if (!map.has("constraints[].motion")) return;
+  const YamlValue motion = map.at("constraints[].motion");
+  c.motion = readMotion(motion, constraint_motion_keys);
+  if (c.isPin())
+    refuseTurning(motion, c.motion, "a pin turns nothing; take the rotation away, or write 'type: rotation', too");
+  else
+    refuseTravel(motion, c.motion, "a rotation moves nothing; take the displacement away, or add a pin that moves");
+}
+
+/// To a free body, or by the motion of a held one.
+void tieToBody(YamlMap &map, const SceneFile &file, Constraint &c) {
+  const SceneFile::BodyPlace place = findBody(map.at("constraints[].body"), file);
+  const Body &body = file.bodyAt(place);
+  if (place.held)
+    c.motion = body.motion.at(c.isPin() ? Vec3(c.point - body.position) : Vec3(Vec3::Zero()));
+  else
+    c.to_body = place.index;
+}
+
+/// A warning where a constraint is far stiffer than its rod; empty where it is not.
+std::string warningOf(const Constraint &c, const Rod &rod, bool to_body, const YamlValue &stiffness) {
+  const double length = rod.length();
+  const double own = c.isPin() ? rod.material.axial_stiffness / length : stiffestTurning(rod.material) / length;
+  if (!(c.stiffness > 1e6 * own)) return "";
+  return "warning: " + stiffness.place() + ": 'stiffness' is " + shortText(c.stiffness / own) + " times that of rod '" +
+         rod.name + "', which costs digits; a " +
+         (to_body     ? "constraint without 'stiffness', of 'type: weld"
+          : c.isTie() ? "junction of 'type: ball"
+          : c.isPin() ? "support of 'type: pin"
+                      : "support of 'type: clamp") +
+         "' is exact";
+}
+
 } // namespace
 
 void readConstraint(const YamlValue &value, SceneFile &out) {
@@ -157,51 +209,13 @@ void readConstraint(const YamlValue &value, SceneFile &out) {
     if (!out.constraint_names.insert(c.name).second)
       value.fail("a constraint with the name '" + c.name + "' is there already");
     c.rod = r;
-    if (!map.has("constraints[].stiffness")) {
-      map.refuseUnknown();
-      value.fail("'stiffness' is missing; to " +
-                 (to.isMap() ? "make two vertices one point exactly, write a junction of 'type: ball'"
-                             : "hold a " + std::string(c.isPin() ? "vertex" : "frame") +
-                                   " exactly, write a support of 'type: " + (c.isPin() ? "pin" : "clamp") + "'"));
-    }
-    c.stiffness = map.number("constraints[].stiffness");
-    c.damping = map.number("constraints[].damping");
-    c.saturation = map.number("constraints[].saturation");
-    c.damps_motion = !map.flag("constraints[].update_old_target");
-    if (c.stiffness == 0 && c.damping == 0)
-      value.fail("'stiffness' and 'damping' are both zero: nothing is constrained");
-    if (c.saturation == 0)
-      map.at("constraints[].saturation").fail("'saturation' must be positive, or negative for none; found 0");
-    if (map.has("constraints[].motion")) {
-      const YamlValue motion = map.at("constraints[].motion");
-      c.motion = readMotion(motion, constraint_motion_keys);
-      if (c.isPin())
-        refuseTurning(motion, c.motion, "a pin turns nothing; take the rotation away, or write 'type: rotation', too");
-      else
-        refuseTravel(motion, c.motion, "a rotation moves nothing; take the displacement away, or add a pin that moves");
-    }
+    readSpring(map, value, to.isMap(), c);
+    readMotionOf(map, c);
     c.isPin() ? readPin(map, rod, out, c) : readRotation(map, rod, c);
-    if (to_body) {
-      const SceneFile::BodyPlace place = findBody(map.at("constraints[].body"), out);
-      const Body &body = out.bodyAt(place);
-      if (place.held)
-        c.motion = body.motion.at(c.isPin() ? Vec3(c.point - body.position) : Vec3(Vec3::Zero()));
-      else
-        c.to_body = place.index;
-    }
-    const double length = rod.length();
-    const double own = c.isPin() ? rod.material.axial_stiffness / length : stiffestTurning(rod.material) / length;
-    if (c.stiffness > 1e6 * own && !told) {
-      out.notes.push_back("warning: " + map.at("constraints[].stiffness").place() + ": 'stiffness' is " +
-                          shortText(c.stiffness / own) + " times that of rod '" + rod.name +
-                          "', which costs digits; a " +
-                          (to_body     ? "constraint without 'stiffness', of 'type: weld"
-                           : c.isTie() ? "junction of 'type: ball"
-                           : c.isPin() ? "support of 'type: pin"
-                                       : "support of 'type: clamp") +
-                          "' is exact");
-      told = true;
-    }
+    if (to_body) tieToBody(map, out, c);
+    const std::string warning = warningOf(c, rod, to_body, map.at("constraints[].stiffness"));
+    if (!warning.empty() && !told) out.notes.push_back(warning);
+    told = told || !warning.empty();
     scene.constraints.push_back(std::move(c));
   }
   map.finish();

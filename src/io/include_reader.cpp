@@ -167,72 +167,69 @@ void carryBodies(SceneFile &out) {
   }
 }
 
-void append(SceneFile part, const std::string &prefix, const YamlValue &where, SceneFile &out) {
-  Scene &scene = out.scene, &from = part.scene;
-  const int rods = int(scene.rods.size()), bodies = int(scene.bodies.size()), held = int(scene.held_bodies.size()),
-            supports = int(scene.supports.size()), joints = int(scene.joints.size()),
-            colliders = int(scene.colliders.size()), all_bodies = int(out.bodies.size());
-  auto clash = [&](const std::string &what, const std::string &name) {
-    where.fail("there is " + what + " '" + name + "' already; write another 'prefix'");
-  };
-  auto shift = [](int &number, int by) {
-    if (number >= 0) number += by;
-  };
+/// Puts a prefix before all names and layers of a scene.
+static void prefixNames(const std::string &prefix, Scene &scene) {
   auto named = [&](std::string &name) { name = prefix + name; };
   auto layered = [&](std::string &layer) {
     if (!layer.empty()) layer = prefix + layer;
   };
-  auto meet = [&](ContactSettings &contact) {
-    for (int &k : contact.passes) k += colliders;
-    contact.apart_from <<= out.ignored_pairs;
-    contact.apart_to <<= out.ignored_pairs;
-  };
-  if (out.ignored_pairs + part.ignored_pairs > 64)
-    where.fail("with it more than 64 pairs of rods and bodies pass through each other by 'ignore', more than fit");
-  for (Rod &rod : from.rods) {
+  for (Rod &rod : scene.rods) {
     named(rod.name);
     layered(rod.layer);
-    meet(rod.contact);
-    if (out.names.isTaken(rod.name)) clash("a rod", rod.name);
   }
-  for (const Rod &rod : from.rods) out.names.add(rod.name);
-  for (std::vector<Body> *list : {&from.bodies, &from.held_bodies})
+  for (std::vector<Body> *list : {&scene.bodies, &scene.held_bodies})
     for (Body &b : *list) {
       named(b.name);
       layered(b.layer);
-      meet(b.contact);
-      b.rod = from.rods.empty() ? 0 : b.rod + rods;
-      if (out.body_numbers.count(b.name)) clash("a body", b.name);
     }
-  for (const auto &[name, number] : part.body_numbers) out.body_numbers[prefix + name] = number + all_bodies;
-  for (SceneFile::BodyPlace place : part.bodies) {
-    place.index += place.held ? held : bodies;
-    out.bodies.push_back(place);
-  }
-  for (Support &s : from.supports) s.rod += rods;
-  for (Constraint &c : from.constraints) {
+  for (Constraint &c : scene.constraints) named(c.name);
+  for (Attachment &a : scene.attachments) named(a.name);
+  for (Junction &j : scene.junctions) named(j.name);
+  for (Joint &j : scene.joints) named(j.name);
+  for (Tendon &t : scene.tendons) named(t.name);
+  for (Collider &c : scene.colliders) {
     named(c.name);
+    layered(c.layer);
+  }
+}
+
+/// Numbers of a scene that comes behind another. \param ignored_pairs of the other
+static void shiftNumbers(const Scene &other, int ignored_pairs, Scene &scene) {
+  const int rods = int(other.rods.size()), bodies = int(other.bodies.size()), joints = int(other.joints.size()),
+            colliders = int(other.colliders.size());
+  auto shift = [](int &number, int by) {
+    if (number >= 0) number += by;
+  };
+  auto meet = [&](ContactSettings &contact) {
+    for (int &k : contact.passes) k += colliders;
+    if (ignored_pairs == 64) return; // it has none
+    contact.apart_from <<= ignored_pairs;
+    contact.apart_to <<= ignored_pairs;
+  };
+  for (Rod &rod : scene.rods) meet(rod.contact);
+  for (std::vector<Body> *list : {&scene.bodies, &scene.held_bodies})
+    for (Body &b : *list) {
+      meet(b.contact);
+      b.rod = scene.rods.empty() ? 0 : b.rod + rods;
+    }
+  for (Support &s : scene.supports) s.rod += rods;
+  for (Constraint &c : scene.constraints) {
     c.rod += rods;
     shift(c.to_rod, rods);
     shift(c.to_body, bodies);
   }
-  for (Attachment &a : from.attachments) {
-    named(a.name);
+  for (Attachment &a : scene.attachments) {
     a.rod += rods;
     a.body += bodies;
   }
-  for (Junction &j : from.junctions) {
-    named(j.name);
+  for (Junction &j : scene.junctions)
     for (Junction::Member &m : j.members) m.rod += rods;
-  }
-  for (Joint &j : from.joints) {
-    named(j.name);
+  for (Joint &j : scene.joints) {
     j.child += bodies;
     shift(j.parent, bodies);
     j.rod += rods;
   }
-  for (Tendon &t : from.tendons) {
-    named(t.name);
+  for (Tendon &t : scene.tendons) {
     t.rod += rods;
     for (Waypoint &p : t.points) {
       shift(p.body, bodies);
@@ -240,49 +237,87 @@ void append(SceneFile part, const std::string &prefix, const YamlValue &where, S
     }
     for (Wrap &w : t.wraps) shift(w.body, bodies);
     for (Tendon::Pull &p : t.joints) p.joint += joints;
-    for (const Tendon &other : scene.tendons)
+  }
+  for (NodalForce &f : scene.forces) f.rod += rods;
+  for (FollowerForce &f : scene.followers) f.rod += rods;
+  for (EdgeMoment &m : scene.moments) m.rod += rods;
+}
+
+/// Adds the names of a scene, which have their prefix, and those that are only in the file, which do not yet.
+static void addNames(const SceneFile &part, const std::string &prefix, const YamlValue &where, SceneFile &out) {
+  const Scene &from = part.scene;
+  auto clash = [&](const std::string &what, const std::string &name) {
+    where.fail("there is " + what + " '" + name + "' already; write another 'prefix'");
+  };
+  for (const Rod &rod : from.rods)
+    if (out.names.isTaken(rod.name)) clash("a rod", rod.name);
+  for (const Rod &rod : from.rods) out.names.add(rod.name);
+  for (const std::vector<Body> *list : {&from.bodies, &from.held_bodies})
+    for (const Body &b : *list)
+      if (out.body_numbers.count(b.name)) clash("a body", b.name);
+  const int all_bodies = int(out.bodies.size());
+  for (const auto &[name, number] : part.body_numbers) out.body_numbers[prefix + name] = number + all_bodies;
+  for (const Tendon &t : from.tendons)
+    for (const Tendon &other : out.scene.tendons)
       if (other.name == t.name) clash("a tendon", t.name);
-  }
-  for (NodalForce &f : from.forces) f.rod += rods;
-  for (FollowerForce &f : from.followers) f.rod += rods;
-  for (EdgeMoment &m : from.moments) m.rod += rods;
-  for (Collider &c : from.colliders) {
-    named(c.name);
-    layered(c.layer);
-    for (const Collider &other : scene.colliders)
+  for (const Collider &c : from.colliders)
+    for (const Collider &other : out.scene.colliders)
       if (other.name == c.name) clash("a collider", c.name);
-  }
   for (const std::string &name : part.constraint_names)
     if (!out.constraint_names.insert(prefix + name).second) clash("a constraint", prefix + name);
   for (const std::string &name : part.joint_names)
     if (!out.joint_names.insert(prefix + name).second) clash("a joint", prefix + name);
+}
+
+/// Adds where the bodies of a file are, and what is at its vertices.
+static void addPlaces(const SceneFile &part, const std::string &prefix, SceneFile &out) {
+  const Scene &scene = out.scene;
+  const int rods = int(scene.rods.size()), supports = int(scene.supports.size());
+  for (SceneFile::BodyPlace place : part.bodies) {
+    place.index += int(place.held ? scene.held_bodies.size() : scene.bodies.size());
+    out.bodies.push_back(place);
+  }
   for (const auto &[vertex, name] : part.joined) out.joined[{vertex.first + rods, vertex.second}] = prefix + name;
   for (const auto &[vertex, name] : part.attached) out.attached[{vertex.first + rods, vertex.second}] = prefix + name;
   for (const auto &[vertex, numbers] : part.supports_at)
     for (const int k : numbers) out.supports_at[{vertex.first + rods, vertex.second}].push_back(k + supports);
+}
+
+template <class Item> static void moveBehind(std::vector<Item> &to, std::vector<Item> &items) {
+  to.insert(to.end(), std::make_move_iterator(items.begin()), std::make_move_iterator(items.end()));
+}
+
+static void moveBehind(Scene &to, Scene &from) {
+  moveBehind(to.rods, from.rods);
+  moveBehind(to.supports, from.supports);
+  moveBehind(to.constraints, from.constraints);
+  moveBehind(to.junctions, from.junctions);
+  moveBehind(to.bodies, from.bodies);
+  moveBehind(to.held_bodies, from.held_bodies);
+  moveBehind(to.attachments, from.attachments);
+  moveBehind(to.joints, from.joints);
+  moveBehind(to.tendons, from.tendons);
+  moveBehind(to.forces, from.forces);
+  moveBehind(to.followers, from.followers);
+  moveBehind(to.moments, from.moments);
+  moveBehind(to.colliders, from.colliders);
+}
+
+void append(SceneFile part, const std::string &prefix, const YamlValue &where, SceneFile &out) {
+  if (out.ignored_pairs + part.ignored_pairs > 64)
+    where.fail("with it more than 64 pairs of rods and bodies pass through each other by 'ignore', more than fit");
+  prefixNames(prefix, part.scene);
+  shiftNumbers(out.scene, out.ignored_pairs, part.scene);
+  addNames(part, prefix, where, out);
+  addPlaces(part, prefix, out);
   out.ignored_pairs += part.ignored_pairs;
   out.constraint_blocks += part.constraint_blocks;
   out.junction_blocks += part.junction_blocks;
   out.joint_blocks += part.joint_blocks;
-  auto add = [](auto &to, auto &items) {
-    to.insert(to.end(), std::make_move_iterator(items.begin()), std::make_move_iterator(items.end()));
-  };
-  add(scene.rods, from.rods);
-  add(scene.supports, from.supports);
-  add(scene.constraints, from.constraints);
-  add(scene.junctions, from.junctions);
-  add(scene.bodies, from.bodies);
-  add(scene.held_bodies, from.held_bodies);
-  add(scene.attachments, from.attachments);
-  add(scene.joints, from.joints);
-  add(scene.tendons, from.tendons);
-  add(scene.forces, from.forces);
-  add(scene.followers, from.followers);
-  add(scene.moments, from.moments);
-  add(scene.colliders, from.colliders);
-  add(out.drawings, part.drawings);
-  add(out.notes, part.notes);
-  add(out.source.paths, part.source.paths);
+  moveBehind(out.scene, part.scene);
+  moveBehind(out.drawings, part.drawings);
+  moveBehind(out.notes, part.notes);
+  moveBehind(out.source.paths, part.source.paths);
   for (auto &file : part.source.files)
     if (std::find(out.source.files.begin(), out.source.files.end(), file) == out.source.files.end())
       out.source.files.push_back(file);

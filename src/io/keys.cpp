@@ -116,20 +116,16 @@ std::string boundsText(const Key &key) {
   return text;
 }
 
-/// What keys of one block ask of each other. The reader says the same, in words.
-std::string rulesOf(std::string_view block) {
-  if (block.empty())
-    return R"("anyOf": [{"required": ["rods"]}, {"required": ["bodies"]}, {"required": ["include"]}],
+constexpr const char *rules_of_scene =
+    R"("anyOf": [{"required": ["rods"]}, {"required": ["bodies"]}, {"required": ["include"]}],
  "if": {"required": ["contact"]}, "then": {"anyOf": [{"required": ["colliders"]}, {"required": ["include"]},
  {"properties": {"contact": {"anyOf": [{"required": ["rods"], "properties": {"rods": {"enum": ["others", "all"]}}}, {"required": ["bodies"], "properties": {"bodies": {"const": true}}}]}}},
  {"required": ["rods"], "properties": {"rods": {"contains": {"required": ["contact"],
   "properties": {"contact": {"type": "object", "anyOf": [{"required": ["rods"], "properties": {"rods": {"enum": ["others", "all"]}}}, {"required": ["bodies"], "properties": {"bodies": {"const": true}}}]}}}}}},
  {"required": ["bodies"], "properties": {"bodies": {"contains": {"required": ["contact"],
   "properties": {"contact": {"type": "object", "required": ["bodies"], "properties": {"bodies": {"const": true}}}}}}}}]})";
-  if (block == "rods[]")
-    return R"("oneOf": [{"required": ["line"]}, {"required": ["ring"]}, {"required": ["helix"]}, {"required": ["points"]}, {"required": ["file"]}])";
-  if (block == "rods[].material")
-    return R"("anyOf": [
+
+constexpr const char *rules_of_material = R"("anyOf": [
  {"required": ["young", "density"],
   "allOf": [
    {"oneOf": [{"required": ["radius"]}, {"required": ["radii"]}, {"anyOf": [{"required": ["width"]}, {"required": ["height"]}]}]},
@@ -137,11 +133,9 @@ std::string rulesOf(std::string_view block) {
   "dependencies": {"width": ["height"], "height": ["width"]}},
  {"not": {"anyOf": [{"required": ["radius"]}, {"required": ["radii"]}, {"required": ["width"]}, {"required": ["height"]}, {"required": ["young"]},
    {"required": ["poisson"]}, {"required": ["shear"]}, {"required": ["density"]}]}}])";
-  if (block == "supports[]")
-    return R"("if": {"properties": {"type": {"const": "pin"}}},
- "then": {"not": {"anyOf": [{"required": ["tangent"]}, {"required": ["director"]}]}})";
-  if (block == "constraints[]")
-    return R"("if": {"anyOf": [{"required": ["body"], "not": {"required": ["stiffness"]}}, {"properties": {"type": {"const": "weld"}}}]},
+
+constexpr const char *rules_of_constraint =
+    R"("if": {"anyOf": [{"required": ["body"], "not": {"required": ["stiffness"]}}, {"properties": {"type": {"const": "weld"}}}]},
  "then": {"required": ["body", "vertex"], "properties": {"type": {"enum": ["pin", "weld"]}},
   "not": {"anyOf": [{"required": ["to"]}, {"required": ["stiffness"]}, {"required": ["motion"]}, {"required": ["point"]}, {"required": ["closest"]},
    {"required": ["edge"]}, {"required": ["measure"]}, {"required": ["saturation"]}, {"required": ["damping"]}, {"required": ["update_old_target"]}]},
@@ -151,8 +145,8 @@ std::string rulesOf(std::string_view block) {
  "then": {"oneOf": [{"required": ["vertex"], "properties": {"closest": {"const": false}}}, {"required": ["closest", "point"], "properties": {"closest": {"const": true}}}],
   "not": {"anyOf": [{"required": ["edge"]}, {"required": ["tangent"]}, {"required": ["director"]}, {"required": ["measure"]}]}},
  "else": {"required": ["edge"], "not": {"anyOf": [{"required": ["vertex"]}, {"required": ["closest"]}, {"required": ["point"]}]}}})";
-  if (block == "bodies[]")
-    return R"("oneOf": [
+
+constexpr const char *rules_of_body = R"("oneOf": [
  {"oneOf": [{"required": ["box"]}, {"required": ["sphere"]}, {"required": ["capsule"]}, {"required": ["cylinder"]}, {"required": ["mesh"]}],
   "allOf": [{"oneOf": [{"required": ["density"]}, {"required": ["mass"]}]}]},
  {"required": ["mass", "inertia"], "not": {"anyOf": [{"required": ["density"]}, {"required": ["box"]}, {"required": ["sphere"]}, {"required": ["capsule"]},
@@ -161,6 +155,18 @@ std::string rulesOf(std::string_view block) {
  "if": {"anyOf": [{"required": ["motion"]}, {"required": ["fixed"], "properties": {"fixed": {"const": true}}}]},
  "then": {"not": {"anyOf": [{"required": ["velocity"]}, {"required": ["angular_velocity"]}, {"required": ["force"]}, {"required": ["torque"]},
   {"required": ["fixed", "motion"], "properties": {"fixed": {"const": true}}}]}})";
+
+/// What keys of one block ask of each other. The reader says the same, in words.
+std::string rulesOf(std::string_view block) {
+  if (block.empty()) return rules_of_scene;
+  if (block == "rods[]")
+    return R"("oneOf": [{"required": ["line"]}, {"required": ["ring"]}, {"required": ["helix"]}, {"required": ["points"]}, {"required": ["file"]}])";
+  if (block == "rods[].material") return rules_of_material;
+  if (block == "supports[]")
+    return R"("if": {"properties": {"type": {"const": "pin"}}},
+ "then": {"not": {"anyOf": [{"required": ["tangent"]}, {"required": ["director"]}]}})";
+  if (block == "constraints[]") return rules_of_constraint;
+  if (block == "bodies[]") return rules_of_body;
   if (block == "supports[].motion" || block == "constraints[].motion" || block == "colliders[].motion" ||
       block == "bodies[].motion")
     return R"("oneOf": [{"required": ["table"]}, {"anyOf": [{"required": ["velocity"]}, {"required": ["angular_velocity"]}, {"required": ["amplitude"]}]}],

@@ -156,6 +156,165 @@ constexpr const char *kinds[] = {"option", "load", "scene", "start"};
 constexpr const char *order_of_rods = "order of the rods", *names_of_rods = "names of the rods",
                      *order_of_holders = "order of supports and constraints";
 
+using Facts = std::vector<RunFacts::Fact>;
+
+void add(Facts &facts, Kind kind, const std::string &name, const std::string &value) {
+  facts.push_back({kind, inOneLine(name), inOneLine(value)});
+}
+void addNumbers(Digest &d, std::initializer_list<int> numbers) { d.add(numbers.begin(), numbers.size() * sizeof(int)); }
+
+std::string onRod(const Scene &scene, const char *what, int place, int rod) {
+  return std::string(what) + std::to_string(place) + " of rod '" + scene.rods[rod].name + "'";
+}
+
+void addOptions(Facts &facts, const LoopSettings &settings) {
+  auto option = [&](const char *name, const std::string &value) { add(facts, Kind::option, name, value); };
+  if (settings.dynamic) {
+    option("dt", textOf(settings.dt));
+    option("integrator", settings.integrator.name);
+    if (settings.integrator.name == "generalized_alpha") option("rho_inf", textOf(settings.integrator.rho_inf));
+    option("dt_adapt", settings.adapt == Adaptation::error ? "error" : "none");
+    if (settings.adapt == Adaptation::error) {
+      option("dt_rtol", textOf(settings.dt_rtol));
+      option("dt_atol", textOf(settings.dt_atol));
+      option("dt_max", textOf(settings.dt_max));
+    }
+    option("output_interval", textOf(settings.output_interval));
+  } else
+    option("load_steps", std::to_string(std::lround(1 / settings.dt)));
+  option("stretch", settings.mixed ? "mixed" : "primal");
+  option("retraction", settings.solve.retraction == RetractionKind::length ? "length" : "additive");
+  option("hessian", settings.hessian == HessianKind::exact ? "exact" : "gauss_newton");
+  option("line_search", settings.solve.line_search == LineSearchKind::energy  ? "energy"
+                        : settings.solve.line_search == LineSearchKind::wolfe ? "wolfe"
+                                                                              : "residual");
+  option("quasi_newton", textOf(settings.solve.quasi_newton));
+  option("rounding_tolerance", textOf(settings.solve.rounding_tolerance));
+}
+
+void addFactsOf(const Rod &rod, Facts &facts) {
+  std::string start = rod.initial_velocity.isZero(0) ? "" : "velocity " + textOf(rod.initial_velocity);
+  if (rod.initial_turns != 0) start += (start.empty() ? "turns " : ", turns ") + textOf(rod.initial_turns);
+  if (!start.empty()) add(facts, Kind::start, "start of rod '" + rod.name + "'", start);
+  const std::string of = " of rod '" + rod.name + "'";
+  add(facts, Kind::scene, "material" + of, textOf(rod.material));
+  add(facts, Kind::scene, "law" + of,
+      std::string(rod.measure == Measure::tan ? "measure tan" : "measure angle") +
+          (rod.energy == Energy::seed ? ", energy seed" : ", energy classical") +
+          (rod.bends() && rod.model != RodModel::full ? std::string(", model ") + nameOf(rod.model) : "") +
+          (rod.gravity ? "" : ", without gravity"));
+  Digest shape;
+  shape.add(rod.position.data(), rod.position.size() * sizeof(Vec3));
+  shape.add(rod.director.data(), rod.director.size() * sizeof(Vec3));
+  shape.add(rod.natural == Rod::Natural::given ? textOf(rod.natural_strain) : "");
+  add(facts, Kind::scene, "shape at rest" + of, "#" + shape.hex());
+}
+
+void addFactsOf(const Body &b, Facts &facts) {
+  add(facts, Kind::load, "force and torque on body '" + b.name + "'", textOf(b.force) + " and " + textOf(b.torque));
+  if (!b.gravity) add(facts, Kind::scene, "gravity on body '" + b.name + "'", "none");
+  if (!b.velocity.isZero(0) || !b.angular_velocity.isZero(0))
+    add(facts, Kind::start, "start of body '" + b.name + "'",
+        textOf(b.velocity) + " and " + textOf(b.angular_velocity));
+}
+
+/// By its hash: what has to be as it was for a state to fit.
+std::string topologyOf(const Scene &scene) {
+  Digest topology;
+  for (const Rod &rod : scene.rods) addNumbers(topology, {rod.vertices(), rod.edges(), int(rod.closed)});
+  for (const Junction &j : scene.junctions)
+    for (const Junction::Member &m : j.members)
+      addNumbers(topology, {int(&j - scene.junctions.data()), m.rod, m.vertex, m.group});
+  for (const Attachment &a : scene.attachments) {
+    addNumbers(topology, {a.rod, a.vertex, a.body, int(a.weld)});
+    topology.add(a.frame.tangent.data(), sizeof(Vec3));
+    topology.add(a.frame.director.data(), sizeof(Vec3));
+  }
+  for (const Body &b : scene.bodies) { // of which the state has the centre of mass
+    topology.add(&b.own.mass, sizeof b.own.mass);
+    topology.add(b.own.centre.data(), sizeof(Vec3));
+    topology.add(b.own.inertia.data(), sizeof(Mat3));
+  }
+  for (const Joint &j : scene.joints) {
+    addNumbers(topology, {int(j.type), j.child, j.parent});
+    topology.add(j.point.data(), sizeof(Vec3));
+    topology.add(j.axes.data(), sizeof(Mat3));
+  }
+  for (const Tendon &t : scene.tendons)
+    for (const Waypoint &p : t.points) {
+      addNumbers(topology, {int(&t - scene.tendons.data()), p.body, p.rod, p.edge});
+      topology.add(p.point.data(), sizeof(Vec3));
+    }
+  return topology.hex();
+}
+
+void addNamesOfRods(Facts &facts, const Scene &scene) {
+  Digest order, set;
+  std::vector<std::string> names;
+  for (const Rod &rod : scene.rods) names.push_back(rod.name);
+  for (const std::string &name : names) order.add(name + "\n");
+  std::sort(names.begin(), names.end());
+  for (const std::string &name : names) set.add(name + "\n");
+  add(facts, Kind::scene, order_of_rods, "#" + order.hex());
+  add(facts, Kind::scene, names_of_rods, "#" + set.hex());
+}
+
+void addHolders(Facts &facts, const Scene &scene) {
+  Digest holders; // a state remembers what they did by their order
+  for (const Support &s : scene.supports) {
+    addNumbers(holders, {int(s.kind), s.rod, s.vertex});
+    add(facts, Kind::scene, onRod(scene, "support at vertex ", s.vertex, s.rod), textOf(s));
+  }
+  for (const Constraint &c : scene.constraints) {
+    addNumbers(holders, {int(c.kind), c.rod, c.at});
+    holders.add(textOf(c, scene));
+    add(facts, Kind::scene, onRod(scene, c.isPin() ? "constraint at vertex " : "constraint at edge ", c.at, c.rod),
+        textOf(c, scene));
+  }
+  for (const Joint &j : scene.joints) {
+    holders.add(j.name);
+    add(facts, Kind::scene, "joint '" + j.name + "'", textOf(j));
+  }
+  for (const Tendon &t : scene.tendons) {
+    holders.add(t.name);
+    add(facts, Kind::scene, "tendon '" + t.name + "'", textOf(t, scene));
+    add(facts, Kind::load, "input of tendon '" + t.name + "'", inputOf(t.actuator));
+  }
+  add(facts, Kind::scene, order_of_holders, "#" + holders.hex());
+}
+
+void addSurfaces(Facts &facts, const Scene &scene) {
+  for (const Collider &c : scene.colliders) add(facts, Kind::scene, "collider '" + c.name + "'", textOf(c));
+  for (const Rod &rod : scene.rods)
+    if (!scene.colliders.empty() || rod.contact.touchesMoving())
+      add(facts, Kind::scene, "contact of rod '" + rod.name + "'", textOf(rod.contact));
+  for (const Rod &rod : scene.rods) {
+    if (!rod.skin) continue;
+    Digest skin;
+    const Skin all = skinOf(rod);
+    for (const SkinPoint &p : all.points) {
+      skin.add(p.edge.data(), sizeof p.edge);
+      skin.add(p.weight.data(), sizeof p.weight);
+      skin.add(p.local.data(), sizeof p.local);
+    }
+    skin.add(all.triangles.data(), all.triangles.size() * sizeof all.triangles[0]);
+    add(facts, Kind::scene, "skin of rod '" + rod.name + "'", "#" + skin.hex());
+  }
+}
+
+void addLoads(Facts &facts, const Scene &scene) {
+  for (const NodalForce &f : scene.forces)
+    if (f.mass > 0) add(facts, Kind::scene, onRod(scene, "mass on vertex ", f.vertex, f.rod), textOf(f.mass));
+  for (const NodalForce &f : scene.forces)
+    add(facts, Kind::load, onRod(scene, "force on vertex ", f.vertex, f.rod), textOf(f.force));
+  for (const FollowerForce &f : scene.followers)
+    add(facts, Kind::load, onRod(scene, "follower force on vertex ", f.vertex, f.rod), textOf(f.force));
+  for (const EdgeMoment &m : scene.moments) {
+    if (m.torque != 0) add(facts, Kind::load, onRod(scene, "torque on edge ", m.edge, m.rod), textOf(m.torque));
+    if (!m.moment.isZero(0)) add(facts, Kind::load, onRod(scene, "moment on edge ", m.edge, m.rod), textOf(m.moment));
+  }
+}
+
 } // namespace
 
 std::string textOf(const std::vector<RunFacts::Fact> &facts) {
@@ -180,11 +339,10 @@ FactValues factsOf(const std::string &text) {
 
 int compareFacts(const FactValues &before, const FactValues &now, bool options, std::vector<std::string> *told) {
   constexpr std::size_t most = 20;
-  int kind = 0;
+  int kind = 0, order_line = -1;
   std::vector<std::string> lines;
   FactValues all = before;
   all.insert(now.begin(), now.end());
-  int order_line = -1;
   bool holders_changed = false;
   for (const auto &[key, any] : all) {
     const auto old = before.find(key), present = now.find(key);
@@ -225,152 +383,18 @@ bool areInAnotherOrder(const FactValues &before, const FactValues &now) {
 
 RunFacts::RunFacts(const Scene &scene, const LoopSettings &settings, const std::string &text)
     : dynamic(settings.dynamic), integrator(settings.dynamic ? settings.integrator.name : "statics"), dt(settings.dt),
-      scene_hash(hashOf(text)) {
-  auto add = [&](Kind kind, const std::string &name, const std::string &value) {
-    facts.push_back({kind, inOneLine(name), inOneLine(value)});
-  };
-  auto option = [&](const char *name, const auto &value) {
-    if constexpr (std::is_convertible_v<decltype(value), std::string>)
-      add(Kind::option, name, value);
-    else
-      add(Kind::option, name, textOf(double(value)));
-  };
-  if (dynamic) {
-    option("dt", dt);
-    option("integrator", integrator);
-    if (integrator == "generalized_alpha") option("rho_inf", settings.integrator.rho_inf);
-    option("dt_adapt", settings.adapt == Adaptation::error ? "error" : "none");
-    if (settings.adapt == Adaptation::error) {
-      option("dt_rtol", settings.dt_rtol);
-      option("dt_atol", settings.dt_atol);
-      option("dt_max", settings.dt_max);
-    }
-    option("output_interval", settings.output_interval);
-  } else {
-    option("load_steps", std::to_string(std::lround(1 / dt)));
-  }
-  option("stretch", settings.mixed ? "mixed" : "primal");
-  option("retraction", settings.solve.retraction == RetractionKind::length ? "length" : "additive");
-  option("hessian", settings.hessian == HessianKind::exact ? "exact" : "gauss_newton");
-  option("line_search", settings.solve.line_search == LineSearchKind::energy  ? "energy"
-                        : settings.solve.line_search == LineSearchKind::wolfe ? "wolfe"
-                                                                              : "residual");
-  option("quasi_newton", settings.solve.quasi_newton);
-  option("rounding_tolerance", settings.solve.rounding_tolerance);
-
-  add(Kind::scene, "gravity", textOf(scene.gravity));
+      topology_hash(topologyOf(scene)), scene_hash(hashOf(text)) {
+  addOptions(facts, settings);
+  add(facts, Kind::scene, "gravity", textOf(scene.gravity));
   if (!scene.rotation.angular_velocity.isZero(0))
-    add(Kind::scene, "rotation", textOf(scene.rotation.angular_velocity) + " about " + textOf(scene.rotation.centre));
-  Digest topology, order, set;
-  std::vector<std::string> names;
-  for (const Rod &rod : scene.rods) {
-    names.push_back(rod.name);
-    order.add(rod.name + "\n");
-    std::string start = rod.initial_velocity.isZero(0) ? "" : "velocity " + textOf(rod.initial_velocity);
-    if (rod.initial_turns != 0) start += (start.empty() ? "turns " : ", turns ") + textOf(rod.initial_turns);
-    if (!start.empty()) add(Kind::start, "start of rod '" + rod.name + "'", start);
-    const int sizes[] = {rod.vertices(), rod.edges(), int(rod.closed)};
-    topology.add(sizes, sizeof sizes);
-    const std::string of = " of rod '" + rod.name + "'";
-    add(Kind::scene, "material" + of, textOf(rod.material));
-    add(Kind::scene, "law" + of,
-        std::string(rod.measure == Measure::tan ? "measure tan" : "measure angle") +
-            (rod.energy == Energy::seed ? ", energy seed" : ", energy classical") +
-            (rod.bends() && rod.model != RodModel::full ? std::string(", model ") + nameOf(rod.model) : "") +
-            (rod.gravity ? "" : ", without gravity"));
-    Digest shape;
-    shape.add(rod.position.data(), rod.position.size() * sizeof(Vec3));
-    shape.add(rod.director.data(), rod.director.size() * sizeof(Vec3));
-    shape.add(rod.natural == Rod::Natural::given ? textOf(rod.natural_strain) : "");
-    add(Kind::scene, "shape at rest" + of, "#" + shape.hex());
-  }
-  for (const Junction &j : scene.junctions)
-    for (const Junction::Member &m : j.members) {
-      const int what[] = {int(&j - scene.junctions.data()), m.rod, m.vertex, m.group};
-      topology.add(what, sizeof what);
-    }
-  for (const Attachment &a : scene.attachments) {
-    const int what[] = {a.rod, a.vertex, a.body, int(a.weld)};
-    topology.add(what, sizeof what);
-    topology.add(a.frame.tangent.data(), sizeof(Vec3));
-    topology.add(a.frame.director.data(), sizeof(Vec3));
-  }
-  for (const Body &b : scene.bodies) { // of which the state has the centre of mass
-    topology.add(&b.own.mass, sizeof b.own.mass);
-    topology.add(b.own.centre.data(), sizeof(Vec3));
-    topology.add(b.own.inertia.data(), sizeof(Mat3));
-    add(Kind::load, "force and torque on body '" + b.name + "'", textOf(b.force) + " and " + textOf(b.torque));
-    if (!b.gravity) add(Kind::scene, "gravity on body '" + b.name + "'", "none");
-    if (!b.velocity.isZero(0) || !b.angular_velocity.isZero(0))
-      add(Kind::start, "start of body '" + b.name + "'", textOf(b.velocity) + " and " + textOf(b.angular_velocity));
-  }
-  for (const Joint &j : scene.joints) {
-    const int what[] = {int(j.type), j.child, j.parent};
-    topology.add(what, sizeof what);
-    topology.add(j.point.data(), sizeof(Vec3));
-    topology.add(j.axes.data(), sizeof(Mat3));
-  }
-  for (const Tendon &t : scene.tendons)
-    for (const Waypoint &p : t.points) {
-      const int what[] = {int(&t - scene.tendons.data()), p.body, p.rod, p.edge};
-      topology.add(what, sizeof what);
-      topology.add(p.point.data(), sizeof(Vec3));
-    }
-  topology_hash = topology.hex();
-  std::sort(names.begin(), names.end());
-  for (const std::string &name : names) set.add(name + "\n");
-  add(Kind::scene, order_of_rods, "#" + order.hex());
-  add(Kind::scene, names_of_rods, "#" + set.hex());
-  auto at = [&](const char *what, int place, int rod) {
-    return std::string(what) + std::to_string(place) + " of rod '" + scene.rods[rod].name + "'";
-  };
-  Digest holders; // a state remembers what they did by their order
-  for (const Support &s : scene.supports) {
-    const int what[] = {int(s.kind), s.rod, s.vertex};
-    holders.add(what, sizeof what);
-    add(Kind::scene, at("support at vertex ", s.vertex, s.rod), textOf(s));
-  }
-  for (const Constraint &c : scene.constraints) {
-    const int what[] = {int(c.kind), c.rod, c.at};
-    holders.add(what, sizeof what);
-    holders.add(textOf(c, scene));
-    add(Kind::scene, at(c.isPin() ? "constraint at vertex " : "constraint at edge ", c.at, c.rod), textOf(c, scene));
-  }
-  for (const Joint &j : scene.joints) {
-    holders.add(j.name);
-    add(Kind::scene, "joint '" + j.name + "'", textOf(j));
-  }
-  for (const Tendon &t : scene.tendons) {
-    holders.add(t.name);
-    add(Kind::scene, "tendon '" + t.name + "'", textOf(t, scene));
-    add(Kind::load, "input of tendon '" + t.name + "'", inputOf(t.actuator));
-  }
-  add(Kind::scene, order_of_holders, "#" + holders.hex());
-  for (const Collider &c : scene.colliders) add(Kind::scene, "collider '" + c.name + "'", textOf(c));
-  for (const Rod &rod : scene.rods)
-    if (!scene.colliders.empty() || rod.contact.touchesMoving())
-      add(Kind::scene, "contact of rod '" + rod.name + "'", textOf(rod.contact));
-  for (const Rod &rod : scene.rods) {
-    if (!rod.skin) continue;
-    Digest skin;
-    const Skin all = skinOf(rod);
-    for (const SkinPoint &p : all.points) {
-      skin.add(p.edge.data(), sizeof p.edge);
-      skin.add(p.weight.data(), sizeof p.weight);
-      skin.add(p.local.data(), sizeof p.local);
-    }
-    skin.add(all.triangles.data(), all.triangles.size() * sizeof all.triangles[0]);
-    add(Kind::scene, "skin of rod '" + rod.name + "'", "#" + skin.hex());
-  }
-  for (const NodalForce &f : scene.forces)
-    if (f.mass > 0) add(Kind::scene, at("mass on vertex ", f.vertex, f.rod), textOf(f.mass));
-  for (const NodalForce &f : scene.forces) add(Kind::load, at("force on vertex ", f.vertex, f.rod), textOf(f.force));
-  for (const FollowerForce &f : scene.followers)
-    add(Kind::load, at("follower force on vertex ", f.vertex, f.rod), textOf(f.force));
-  for (const EdgeMoment &m : scene.moments) {
-    if (m.torque != 0) add(Kind::load, at("torque on edge ", m.edge, m.rod), textOf(m.torque));
-    if (!m.moment.isZero(0)) add(Kind::load, at("moment on edge ", m.edge, m.rod), textOf(m.moment));
-  }
+    add(facts, Kind::scene, "rotation",
+        textOf(scene.rotation.angular_velocity) + " about " + textOf(scene.rotation.centre));
+  for (const Rod &rod : scene.rods) addFactsOf(rod, facts);
+  for (const Body &b : scene.bodies) addFactsOf(b, facts);
+  addNamesOfRods(facts, scene);
+  addHolders(facts, scene);
+  addSurfaces(facts, scene);
+  addLoads(facts, scene);
 }
 
 } // namespace tendril

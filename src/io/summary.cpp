@@ -82,6 +82,42 @@ Summary summarize(const Scene &scene, const Elements &elements, const State &sta
   return out;
 }
 
+static std::string supportText(const Summary &s, const Scene &scene, std::size_t k) {
+  const Support &support = scene.supports[k];
+  std::string what = support.holdsPosition() ? textOf(s.force[k], "N") : "";
+  if (support.holdsTwist()) what += (what.empty() ? "" : ", ") + textOf(s.moment[k], "N m");
+  return what + ": " + nameOf(support.kind) + " at vertex " + std::to_string(support.vertex) + " of rod '" +
+         scene.rods[std::size_t(support.rod)].name + "'";
+}
+
+static std::string constraintText(const Summary &s, const Scene &scene, std::size_t k) {
+  const Constraint &c = scene.constraints[k];
+  return (c.isPin() ? textOf(s.constraint[k].force, "N") + ": pin '"
+                    : textOf(s.constraint[k].moment, "N m") + ": rotation '") +
+         inOneLine(c.name) + "' " + (c.isPin() ? "at vertex " : "on edge ") + std::to_string(c.at) + " of rod '" +
+         scene.rods[std::size_t(c.rod)].name + "', " +
+         (c.isToBody() ? "to body '" + scene.bodies[std::size_t(c.to_body)].name + "', "
+          : c.isTie()  ? "to vertex " + std::to_string(c.to_vertex) + " of rod '" +
+                            scene.rods[std::size_t(c.to_rod)].name + "', "
+                      : "") +
+         (c.isPin() ? textOf(s.constraint[k].distance, "m") + " off"
+                    : textOf(s.constraint[k].rotation, "rad") + " off");
+}
+
+static std::string jointText(const Summary &s, const Scene &scene, std::size_t k) {
+  const Joint &j = scene.joints[k];
+  const JointReading &of = s.joint[k];
+  std::string what = textOf(of.force, "N") + ", " + textOf(of.moment, "N m") + ": " + std::string(nameOf(j.type)) +
+                     " '" + inOneLine(j.name) + "' of body '" + scene.bodies[std::size_t(j.child)].name + "'";
+  std::ostringstream at;
+  at << std::setprecision(5) << of.coordinate;
+  if (j.held().slidesFreely())
+    what += ", at " + at.str() + " m";
+  else if (j.type != Joint::Type::fixed)
+    what += ", at " + at.str() + " rad";
+  return what;
+}
+
 std::vector<std::string> describe(const Summary &s, const Scene &scene) {
   std::vector<std::string> lines;
   auto row = [&](const std::string &name, const std::string &value, const std::string &where) {
@@ -108,43 +144,12 @@ std::vector<std::string> describe(const Summary &s, const Scene &scene) {
   if (scene.supports.size() + scene.constraints.size() + scene.joints.size() > 1)
     row(std::exchange(name, ""),
         textOf(s.total_force, "N") + " in all; about the origin " + textOf(s.total_moment, "N m"), "");
-  for (std::size_t k = 0; k < scene.supports.size() && scene.supports.size() <= most_supports_told; ++k) {
-    const Support &support = scene.supports[k];
-    std::string what = support.holdsPosition() ? textOf(s.force[k], "N") : "";
-    if (support.holdsTwist()) what += (what.empty() ? "" : ", ") + textOf(s.moment[k], "N m");
-    row(std::exchange(name, ""),
-        what + ": " + nameOf(support.kind) + " at vertex " + std::to_string(support.vertex) + " of rod '" +
-            scene.rods[std::size_t(support.rod)].name + "'",
-        "");
-  }
-  for (std::size_t k = 0; k < scene.constraints.size() && scene.constraints.size() <= most_supports_told; ++k) {
-    const Constraint &c = scene.constraints[k];
-    row(std::exchange(name, ""),
-        (c.isPin() ? textOf(s.constraint[k].force, "N") + ": pin '"
-                   : textOf(s.constraint[k].moment, "N m") + ": rotation '") +
-            inOneLine(c.name) + "' " + (c.isPin() ? "at vertex " : "on edge ") + std::to_string(c.at) + " of rod '" +
-            scene.rods[std::size_t(c.rod)].name + "', " +
-            (c.isToBody() ? "to body '" + scene.bodies[std::size_t(c.to_body)].name + "', "
-             : c.isTie()  ? "to vertex " + std::to_string(c.to_vertex) + " of rod '" +
-                               scene.rods[std::size_t(c.to_rod)].name + "', "
-                         : "") +
-            (c.isPin() ? textOf(s.constraint[k].distance, "m") + " off"
-                       : textOf(s.constraint[k].rotation, "rad") + " off"),
-        "");
-  }
-  for (std::size_t k = 0; k < scene.joints.size() && scene.joints.size() <= most_supports_told; ++k) {
-    const Joint &j = scene.joints[k];
-    const JointReading &of = s.joint[k];
-    std::string what = textOf(of.force, "N") + ", " + textOf(of.moment, "N m") + ": " + std::string(nameOf(j.type)) +
-                       " '" + inOneLine(j.name) + "' of body '" + scene.bodies[std::size_t(j.child)].name + "'";
-    std::ostringstream at;
-    at << std::setprecision(5) << of.coordinate;
-    if (j.held().slidesFreely())
-      what += ", at " + at.str() + " m";
-    else if (j.type != Joint::Type::fixed)
-      what += ", at " + at.str() + " rad";
-    row(std::exchange(name, ""), what, "");
-  }
+  for (std::size_t k = 0; k < scene.supports.size() && scene.supports.size() <= most_supports_told; ++k)
+    row(std::exchange(name, ""), supportText(s, scene, k), "");
+  for (std::size_t k = 0; k < scene.constraints.size() && scene.constraints.size() <= most_supports_told; ++k)
+    row(std::exchange(name, ""), constraintText(s, scene, k), "");
+  for (std::size_t k = 0; k < scene.joints.size() && scene.joints.size() <= most_supports_told; ++k)
+    row(std::exchange(name, ""), jointText(s, scene, k), "");
   return lines;
 }
 

@@ -15,6 +15,42 @@ static bool isInside(const std::string &file, const std::string &folder) {
   return std::mismatch(top.begin(), top.end(), whole.begin(), whole.end()).first == top.end();
 }
 
+/// Reads the newest checkpoint of the folder that is whole. \return which, empty where there is none
+static std::string readNewest(const Options &o, const OutputFolder &folder, const RunFacts &facts, Simulation &run,
+                              StepControl *control, bool *changed, std::vector<std::string> *told) {
+  for (const std::string &path : folder.checkpoints()) {
+    try {
+      *changed = readCheckpoint(path, &run, control, facts, told);
+      return path;
+    } catch (const DamagedCheckpoint &e) {
+      told->push_back("passed over: " + std::string(e.what()));
+    }
+  }
+  if (!told->empty())
+    throw SceneError("option -restart: no checkpoint in '" + o.output_dir + "' is whole (" + told->front() +
+                     "); to run from the start, without those results, take '-restart auto' away");
+  told->push_back("-restart auto: no checkpoint in " + o.output_dir + ", from the start");
+  return "";
+}
+
+/// Reads the checkpoint that was asked for. \return its path
+static std::string readAsked(const Options &o, const RunFacts &facts, Simulation &run, StepControl *control,
+                             bool *changed, std::vector<std::string> *told) {
+  const std::string from = std::filesystem::is_directory(o.restart)
+                               ? (std::filesystem::path(o.restart) / "checkpoint.h5").string()
+                               : o.restart;
+  if (!std::filesystem::exists(from))
+    throw SceneError("option -restart: there is no checkpoint '" + from +
+                     "'; give that of a run, or its output folder");
+  *changed = readCheckpoint(from, &run, control, facts, told);
+  if (isInside(from, o.output_dir))
+    throw SceneError("option -restart: the results would replace those beside the checkpoint '" + from +
+                     "'; choose another -output_dir, or write -restart auto");
+  if (o.restart_time) run.state.time = *o.restart_time;
+  if ((!run.scene.colliders.empty() || run.scene.touchesMoving()) && (*changed || o.restart_time)) refuseOverlaps(run);
+  return from;
+}
+
 bool takeUp(const Options &o, const OutputFolder &folder, const RunFacts &facts, Simulation &run, StepControl *control,
             std::vector<std::string> *told) {
   const bool automatic = o.restart == "auto";
@@ -24,33 +60,10 @@ bool takeUp(const Options &o, const OutputFolder &folder, const RunFacts &facts,
     throw SceneError("option -restart: -continuation arclength cannot be taken up again");
   if (automatic && o.restart_time)
     throw SceneError("option -restart_time: -restart auto goes on at the time of its checkpoint");
-  if (automatic) {
-    for (const std::string &path : folder.checkpoints()) {
-      try {
-        changed = readCheckpoint(path, &run, control, facts, told);
-        from = path;
-        break;
-      } catch (const DamagedCheckpoint &e) {
-        told->push_back("passed over: " + std::string(e.what()));
-      }
-    }
-    if (from.empty() && !told->empty())
-      throw SceneError("option -restart: no checkpoint in '" + o.output_dir + "' is whole (" + told->front() +
-                       "); to run from the start, without those results, take '-restart auto' away");
-    if (from.empty()) told->push_back("-restart auto: no checkpoint in " + o.output_dir + ", from the start");
-  } else if (!o.restart.empty()) {
-    from = std::filesystem::is_directory(o.restart) ? (std::filesystem::path(o.restart) / "checkpoint.h5").string()
-                                                    : o.restart;
-    if (!std::filesystem::exists(from))
-      throw SceneError("option -restart: there is no checkpoint '" + from +
-                       "'; give that of a run, or its output folder");
-    changed = readCheckpoint(from, &run, control, facts, told);
-    if (isInside(from, o.output_dir))
-      throw SceneError("option -restart: the results would replace those beside the checkpoint '" + from +
-                       "'; choose another -output_dir, or write -restart auto");
-    if (o.restart_time) run.state.time = *o.restart_time;
-    if ((!run.scene.colliders.empty() || run.scene.touchesMoving()) && (changed || o.restart_time)) refuseOverlaps(run);
-  }
+  if (automatic)
+    from = readNewest(o, folder, facts, run, control, &changed, told);
+  else if (!o.restart.empty())
+    from = readAsked(o, facts, run, control, &changed, told);
   if (!from.empty() && !(run.state.time < o.loop.t_end)) {
     if (changed && !o.loop.dynamic) {
       run.state.time = 0;

@@ -31,6 +31,20 @@ PetscErrorCode createLocalVector(DM dm, Vec *v) {
   PetscFunctionReturn(0);
 }
 
+PetscErrorCode nameFields(PetscSection section, bool rotations) {
+  PetscFunctionBeginUser;
+  PetscCall(PetscSectionSetNumFields(section, rotations ? 3 : 2));
+  PetscCall(PetscSectionSetFieldName(section, 0, "position"));
+  PetscCall(PetscSectionSetFieldComponents(section, 0, 3));
+  PetscCall(PetscSectionSetFieldName(section, 1, "twist"));
+  PetscCall(PetscSectionSetFieldComponents(section, 1, 1));
+  if (rotations) {
+    PetscCall(PetscSectionSetFieldName(section, 2, "rotation"));
+    PetscCall(PetscSectionSetFieldComponents(section, 2, 3));
+  }
+  PetscFunctionReturn(0);
+}
+
 /// Vertices whose positions are no unknowns: those that are held, and copies in junctions.
 std::vector<bool> withoutUnknowns(std::vector<bool> held, const std::vector<RodRange> &rods,
                                   const std::vector<JoinedVertex> &joined) {
@@ -50,15 +64,7 @@ PetscErrorCode DofMap::createSection(PetscSection *section) const {
   for (const JoinedEdge &j : joined_edges_.items) points += j.isFirst();
   points += 2 * PetscInt(bodies_.items.size());
   PetscCall(PetscSectionCreate(PETSC_COMM_SELF, section));
-  PetscCall(PetscSectionSetNumFields(*section, groups_ == 0 ? 2 : 3));
-  PetscCall(PetscSectionSetFieldName(*section, 0, "position"));
-  PetscCall(PetscSectionSetFieldComponents(*section, 0, 3));
-  PetscCall(PetscSectionSetFieldName(*section, 1, "twist"));
-  PetscCall(PetscSectionSetFieldComponents(*section, 1, 1));
-  if (groups_ > 0) {
-    PetscCall(PetscSectionSetFieldName(*section, 2, "rotation"));
-    PetscCall(PetscSectionSetFieldComponents(*section, 2, 3));
-  }
+  PetscCall(nameFields(*section, groups_ > 0));
   PetscCall(PetscSectionSetChart(*section, 0, points));
   PetscInt point = 0;
   std::unordered_map<PetscInt, PetscInt> flat; // coordinates of vertices that are no unknowns

@@ -196,6 +196,79 @@ bool areAlike(const Scene &scene, const std::vector<Drawing> &drawings, int a, i
   return namedVertices(scene, a) == namedVertices(scene, b);
 }
 
+/// A scene on its way from what is written to other numbers of edges.
+struct Remeshing {
+  const Scene &written;
+  const std::vector<Drawing> &drawings;
+  const std::vector<int> &edges;
+  Scene scene;
+
+  bool changes(int rod) const { return isRemeshed(written.rods[rod], drawings[rod], edges[rod]); }
+  int vertex(int rod, int vertex) const { return movedVertex(written.rods[rod], drawings[rod], vertex, edges[rod]); }
+  int edge(int rod, int edge) const { return movedEdge(written.rods[rod], drawings[rod], edge, edges[rod]); }
+  /// As drawn at a vertex of the remeshed rod.
+  Frame frame(int rod, int vertex) const {
+    return drawings[rod].grading ? frameBetween(scene.rods[rod], vertex) : frameAtVertex(scene.rods[rod], vertex);
+  }
+  void move(Support &s) const;
+  void move(Constraint &c) const;
+  void move(Waypoint &p) const;
+  void move(Attachment &a) const;
+  void move(Junction &j);
+};
+
+void Remeshing::move(Support &s) const {
+  if (!changes(s.rod)) return;
+  s.vertex = vertex(s.rod, s.vertex);
+  const Frame f = frame(s.rod, s.vertex);
+  if (!s.tangent_given) s.frame.tangent = f.tangent;
+  if (!s.director_given) s.frame.director = f.director;
+  s.frame.director = orthonormalised(s.frame.director, s.frame.tangent);
+}
+
+void Remeshing::move(Constraint &c) const {
+  if (c.isTie() && changes(c.to_rod)) c.to_vertex = vertex(c.to_rod, c.to_vertex);
+  if (!changes(c.rod)) return;
+  c.at = c.isPin() ? vertex(c.rod, c.at) : edge(c.rod, c.at);
+  const Rod &rod = scene.rods[c.rod];
+  if (c.isPin()) {
+    if (!c.point_given) c.point = rod.position[c.at];
+    return;
+  }
+  const Frame drawn = referenceFrame(rod, c.at);
+  if (!c.director_given) // goes with the edge, or with the tangent that is given
+    c.frame.director =
+        c.tangent_given ? transport<double>(drawn.director, drawn.tangent, c.frame.tangent) : drawn.director;
+  if (!c.tangent_given) c.frame.tangent = drawn.tangent;
+  c.frame.director = orthonormalised(c.frame.director, c.frame.tangent);
+}
+
+void Remeshing::move(Waypoint &p) const {
+  if (p.isTold() || p.body >= 0 || !changes(p.rod)) return;
+  if (p.isVertex())
+    p.setVertex(vertex(p.rod, p.vertex()), scene.rods[p.rod].edges());
+  else
+    p.edge = edge(p.rod, p.edge);
+}
+
+void Remeshing::move(Attachment &a) const {
+  if (!changes(a.rod)) return;
+  a.vertex = vertex(a.rod, a.vertex);
+  const Frame f = frame(a.rod, a.vertex);
+  const Vec3 tangent = a.tangent_given ? a.frame.tangent : f.tangent;
+  if (!a.director_given) a.frame.director = transport<double>(f.director, f.tangent, tangent);
+  a.frame.tangent = tangent;
+  a.frame.director = orthonormalised(a.frame.director, tangent);
+}
+
+/// Its vertices are in one place, to the bit.
+void Remeshing::move(Junction &j) {
+  for (Junction::Member &m : j.members) {
+    m.vertex = vertex(m.rod, m.vertex);
+    scene.rods[m.rod].position[m.vertex] = scene.rods[j.members[0].rod].position[j.members[0].vertex];
+  }
+}
+
 } // namespace
 
 Curve curveThrough(const Rod &rod) {
@@ -283,87 +356,32 @@ int edgeMultiple(const Scene &scene, const Drawing &drawing, int r) {
 }
 
 Scene remesh(const Scene &written, const std::vector<Drawing> &drawings, const std::vector<int> &edges) {
-  Scene scene;
+  Remeshing remeshing{written, drawings, edges, {}};
+  Scene &scene = remeshing.scene;
   scene.gravity = written.gravity;
   scene.rotation = written.rotation;
   scene.colliders = written.colliders;
   for (std::size_t r = 0; r < written.rods.size(); ++r)
-    scene.rods.push_back(isRemeshed(written.rods[r], drawings[r], edges[r])
-                             ? remeshed(written.rods[r], drawings[r], edges[r])
-                             : written.rods[r]);
+    scene.rods.push_back(remeshing.changes(int(r)) ? remeshed(written.rods[r], drawings[r], edges[r])
+                                                   : written.rods[r]);
   for (Rod &rod : scene.rods)
     if (rod.flat >= 0) flatten(rod);
-  for (const Support &support : written.supports) {
-    Support &s = scene.supports.emplace_back(support);
-    const Rod &rod = scene.rods[s.rod];
-    const Drawing &drawing = drawings[s.rod];
-    if (!isRemeshed(written.rods[s.rod], drawing, edges[s.rod])) continue;
-    s.vertex = movedVertex(written.rods[s.rod], drawing, support.vertex, edges[s.rod]);
-    const Frame f = drawing.grading ? frameBetween(rod, s.vertex) : frameAtVertex(rod, s.vertex);
-    if (!s.tangent_given) s.frame.tangent = f.tangent;
-    if (!s.director_given) s.frame.director = f.director;
-    s.frame.director = orthonormalised(s.frame.director, s.frame.tangent);
-  }
-  for (const Constraint &constraint : written.constraints) {
-    Constraint &c = scene.constraints.emplace_back(constraint);
-    if (c.isTie() && isRemeshed(written.rods[c.to_rod], drawings[c.to_rod], edges[c.to_rod]))
-      c.to_vertex = movedVertex(written.rods[c.to_rod], drawings[c.to_rod], c.to_vertex, edges[c.to_rod]);
-    const Rod &rod = scene.rods[c.rod], &before = written.rods[c.rod];
-    if (!isRemeshed(before, drawings[c.rod], edges[c.rod])) continue;
-    c.at = c.isPin() ? movedVertex(before, drawings[c.rod], c.at, edges[c.rod])
-                     : movedEdge(before, drawings[c.rod], c.at, edges[c.rod]);
-    if (c.isPin()) {
-      if (!c.point_given) c.point = rod.position[c.at];
-      continue;
-    }
-    const Frame drawn = referenceFrame(rod, c.at);
-    if (!c.director_given) // goes with the edge, or with the tangent that is given
-      c.frame.director =
-          c.tangent_given ? transport<double>(drawn.director, drawn.tangent, c.frame.tangent) : drawn.director;
-    if (!c.tangent_given) c.frame.tangent = drawn.tangent;
-    c.frame.director = orthonormalised(c.frame.director, c.frame.tangent);
-  }
+  for (const Support &s : written.supports) remeshing.move(scene.supports.emplace_back(s));
+  for (const Constraint &c : written.constraints) remeshing.move(scene.constraints.emplace_back(c));
   scene.bodies = written.bodies;
   scene.held_bodies = written.held_bodies;
   scene.joints = written.joints;
   scene.tendons = written.tendons;
   for (Tendon &tendon : scene.tendons)
-    for (Waypoint &p : tendon.points) {
-      if (p.isTold() || p.body >= 0 || !isRemeshed(written.rods[p.rod], drawings[p.rod], edges[p.rod])) continue;
-      if (p.isVertex())
-        p.setVertex(movedVertex(written.rods[p.rod], drawings[p.rod], p.vertex(), edges[p.rod]),
-                    scene.rods[p.rod].edges());
-      else
-        p.edge = movedEdge(written.rods[p.rod], drawings[p.rod], p.edge, edges[p.rod]);
-    }
-  for (const Attachment &attachment : written.attachments) {
-    Attachment &a = scene.attachments.emplace_back(attachment);
-    const Drawing &drawing = drawings[a.rod];
-    if (!isRemeshed(written.rods[a.rod], drawing, edges[a.rod])) continue;
-    a.vertex = movedVertex(written.rods[a.rod], drawing, a.vertex, edges[a.rod]);
-    const Rod &rod = scene.rods[a.rod];
-    const Frame f = drawing.grading ? frameBetween(rod, a.vertex) : frameAtVertex(rod, a.vertex);
-    const Vec3 tangent = a.tangent_given ? a.frame.tangent : f.tangent;
-    if (!a.director_given) a.frame.director = transport<double>(f.director, f.tangent, tangent);
-    a.frame.tangent = tangent;
-    a.frame.director = orthonormalised(a.frame.director, tangent);
-  }
-  for (const Junction &junction : written.junctions) {
-    Junction &j = scene.junctions.emplace_back(junction);
-    for (Junction::Member &m : j.members) {
-      m.vertex = movedVertex(written.rods[m.rod], drawings[m.rod], m.vertex, edges[m.rod]);
-      scene.rods[m.rod].position[m.vertex] = // to the bit
-          scene.rods[j.members[0].rod].position[j.members[0].vertex];
-    }
-  }
+    for (Waypoint &p : tendon.points) remeshing.move(p);
+  for (const Attachment &a : written.attachments) remeshing.move(scene.attachments.emplace_back(a));
+  for (const Junction &j : written.junctions) remeshing.move(scene.junctions.emplace_back(j));
   for (const NodalForce &f : written.forces)
-    scene.forces.push_back(
-        {f.rod, movedVertex(written.rods[f.rod], drawings[f.rod], f.vertex, edges[f.rod]), f.force, f.mass});
+    scene.forces.push_back({f.rod, remeshing.vertex(f.rod, f.vertex), f.force, f.mass});
   for (const FollowerForce &f : written.followers)
-    scene.followers.push_back(
-        {f.rod, movedVertex(written.rods[f.rod], drawings[f.rod], f.vertex, edges[f.rod]), f.force});
+    scene.followers.push_back({f.rod, remeshing.vertex(f.rod, f.vertex), f.force});
   for (const EdgeMoment &m : written.moments) addCouple(written, drawings[m.rod], m, edges[m.rod], scene.moments);
-  return scene;
+  return std::move(remeshing.scene);
 }
 
 std::vector<int> edgesOf(const Scene &scene, int factor) {

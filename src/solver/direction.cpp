@@ -268,6 +268,7 @@ PetscErrorCode NewtonSolver::direct(Vec x, Vec f, Vec y) {
   bool regular, possible;
   PetscFunctionBeginUser;
   PetscCall(moveTo(x, &possible));
+  PetscCheck(possible, PETSC_COMM_SELF, PETSC_ERR_PLIB, "no configuration is where the line search ended");
   if (fresh_)
     PetscCall(solveAgain(f, y));
   else

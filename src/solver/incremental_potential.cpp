@@ -11,11 +11,11 @@ namespace tendril {
 using C = Configuration;
 
 IncrementalPotential::IncrementalPotential(const Scene &scene, DofMap &dofs, const Elements &elements, bool dynamic)
-    : scene_(scene), dofs_(dofs), elements_(elements), retraction_(elements), linkage_(scene, elements), axial_(scene, elements),
-      terms_(makeTerms(scene, elements, axial_, dynamic)), supports_(scene, dofs, elements), start_(elements.slots),
-      known_(elements.rods.size(), Known::nothing), scales_(rodScales(scene, elements)), dynamic_(dynamic),
-      couples_positions_(
-          std::any_of(terms_.begin(), terms_.end(), [](const auto &term) { return term->couplesPositions(); })),
+    : scene_(scene), dofs_(dofs), elements_(elements), retraction_(elements), linkage_(scene, elements),
+      axial_(scene, elements), terms_(makeTerms(scene, elements, axial_, dynamic)), supports_(scene, dofs, elements),
+      start_(elements.slots), known_(elements.rods.size(), Known::nothing), scales_(rodScales(scene, elements)),
+      dynamic_(dynamic), couples_positions_(std::any_of(terms_.begin(), terms_.end(),
+                                                        [](const auto &term) { return term->couplesPositions(); })),
       joins_positions_(
           std::any_of(terms_.begin(), terms_.end(), [](const auto &term) { return term->joinsPositions(); })),
       touches_(scene.touchesMoving() || !scene.tendons.empty()), obstacles_move_(scene.collidersMove()),

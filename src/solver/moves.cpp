@@ -194,11 +194,10 @@ void IncrementalPotential::coordinates(Planes &x, RodSet rods) const {
   }
 }
 
-bool IncrementalPotential::moveTo(const Planes &x, RodSet rods, bool supports) {
-  Planes now = dofs_.makePlanes(), increment = now;
+bool IncrementalPotential::moveTo(const Planes &x, RodSet rods, Configuration &trial, bool supports) {
+  Planes now = dofs_.makePlanes(rods), increment = now;
   if (supports) remainingMotion(rods, increment);
   coordinates(now, rods);
-  Configuration trial;
   for (int r = rods.begin; r < rods.end; ++r) {
     const RodRange &rod = elements_.rods[r];
     for (int s = rod.first_slot; s < rod.vertexEnd(); ++s)

@@ -35,9 +35,9 @@ PetscErrorCode NewtonSolver::moveTo(Vec x, bool *possible) {
   *possible = true;
   PetscCall(PetscObjectStateGet((PetscObject)x, &state));
   if (x == iterate_vec_ && state == iterate_state_) PetscFunctionReturn(0);
-  Planes wanted = potential_->dofs().makePlanes();
+  Planes wanted = potential_->dofs().makePlanes(rods_);
   PetscCall(potential_->dofs().scatter(x, rods_, wanted));
-  *possible = potential_->moveTo(wanted, rods_, true);
+  *possible = potential_->moveTo(wanted, rods_, work_->trial, true);
   forgetEnergies();
   if (!*possible) iterate_vec_ = nullptr;
   if (!*possible) PetscFunctionReturn(0);
@@ -317,7 +317,7 @@ void NewtonSolver::begin(const State &start, Seek seek, const Guess *guess, int 
     return;
   }
   const bool complete = guess->axial_force.size() > 0;
-  const bool possible = potential_->moveTo(guess->unknowns, rods_, complete);
+  const bool possible = potential_->moveTo(guess->unknowns, rods_, work_->trial, complete);
   for (int r = rods_.begin; r < rods_.end; ++r)
     if (!possible)
       potential_->beginRod(start, r); // from the start, then

@@ -4,8 +4,6 @@
 #include "tendril/solver/hints.hpp"
 #include "tendril/solver/newton.hpp"
 
-#include <Eigen/Eigenvalues>
-
 #include <algorithm>
 #include <cmath>
 
@@ -50,7 +48,7 @@ void NewtonSolver::weigh(const Planes &motion, Planes &weighed) const {
 
 /// Makes the mode in work_->increment one of unit mass; returns the root of the mass it had.
 double NewtonSolver::normaliseMode() {
-  Planes weighed = potential_->dofs().makePlanes();
+  Planes weighed = potential_->dofs().makePlanes(rods_);
   weigh(work_->increment, weighed);
   const double mass = potential_->dofs().dot(rods_, weighed, work_->increment);
   for (double &d : work_->increment) d /= std::sqrt(mass);
@@ -83,7 +81,7 @@ PetscErrorCode NewtonSolver::criticalMode(int stable, double *lift, Planes *mode
   normaliseMode();
   for (int k = 0; k < iterations; ++k) {
     watch().beat();
-    Planes right = potential_->dofs().makePlanes();
+    Planes right = potential_->dofs().makePlanes(rods_);
     weigh(work_->increment, right);
     PetscCall(solveLinear(right, work_->increment));
     normaliseMode();
@@ -105,158 +103,6 @@ PetscErrorCode NewtonSolver::criticalMode(int stable, double *lift, Planes *mode
   }
   if (largest < 0)
     for (double &d : *mode) d = -d;
-  PetscFunctionReturn(0);
-}
-
-namespace {
-
-/// A motion v, A v and (A - K) v, with the Hessian K and a definite matrix A beside it.
-struct Probe {
-  Planes motion, stiff, soft;
-};
-
-/// The combination of up to three probes with the largest quotient of v'(A - K)v and v'Av, island by island: a step of
-/// locally optimal conjugate gradients (Knyazev 2001) from `x` along `w`, and what the last step moved by, `p`. `x` has
-/// v'Av = 1 then.
-void improve(const DofMap &dofs, RodSet island, const Probe &w, Probe &x, Probe &p, int count) {
-  const std::array<const Probe *, 3> basis{&w, &x, &p};
-  Eigen::MatrixXd stiff(3, 3), soft(3, 3);
-  for (int i = 0; i < count; ++i)
-    for (int j = 0; j <= i; ++j) {
-      stiff(i, j) = stiff(j, i) = dofs.dot(island, basis[i]->motion, basis[j]->stiff);
-      soft(i, j) = soft(j, i) = dofs.dot(island, basis[i]->motion, basis[j]->soft);
-    }
-  Eigen::Vector3d share = Eigen::Vector3d::Zero();
-  for (bool independent = false; count > 0 && !independent;
-       --count) { // what is almost a combination of the others is left out
-    const Eigen::VectorXd scale = stiff.diagonal().head(count).cwiseSqrt().cwiseInverse();
-    const Eigen::MatrixXd a = scale.asDiagonal() * stiff.topLeftCorner(count, count) * scale.asDiagonal();
-    independent = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(a).eigenvalues()[0] > 1e-10;
-    if (!independent) continue;
-    const Eigen::MatrixXd b = scale.asDiagonal() * soft.topLeftCorner(count, count) * scale.asDiagonal();
-    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> ritz(b, a);
-    share.head(count) = scale.cwiseProduct(ritz.eigenvectors().col(count - 1));
-  }
-  auto combine = [&](Planes Probe::*part) {
-    for (int r = island.begin; r < island.end; ++r) {
-      const RodRange &rod = dofs.rods()[r];
-      for (int a = 0; a < slot_size; ++a) {
-        const double *along = (w.*part)[a];
-        double *here = (x.*part)[a], *last = (p.*part)[a];
-        auto combined = [&](int s) {
-          last[s] = share[0] * along[s] + share[2] * last[s];
-          here[s] = share[1] * here[s] + last[s];
-        };
-        for (int s = rod.first_slot; s < rod.vertexEnd() + 2; ++s) combined(s);
-        if (a < 3) dofs.forBeside({r, r + 1}, combined);
-      }
-    }
-  };
-  for (Planes Probe::*part : {&Probe::motion, &Probe::stiff, &Probe::soft}) combine(part);
-}
-
-} // namespace
-
-/// Directions of negative curvature of the rods with negative pivots, in work_->increment. With the Hessian K = E - G
-/// split into the part E without compression and the effect G of compression, the largest eigenvalue of E^-1 G belongs
-/// to the first buckling mode, the smoothest way out. Where compression is not the cause, or leaves motions without
-/// stiffness, the shifted Hessian in place of E gives the lowest mode, beginning from the last shift. `neutral`: rods
-/// whose mode costs no energy, to rounding, and that nothing goes down from: a turn of the whole rod about an axis,
-/// say.
-PetscErrorCode NewtonSolver::findBucklingModes(std::vector<char> *found, std::vector<char> *neutral) {
-  // Of the energies that balance, stiff edges leave 1e-7 by rounding; and what the forces are out of balance by, a
-  // neutral motion is curved by.
-  const double rounding = std::clamp(10 * report_.residual.force, 1e-7, 1e-5);
-  constexpr int enough = 5; // iterations for a mode that is not close to another
-  PetscFunctionBeginUser;
-  const DofMap &dofs = potential_->dofs();
-  const Elements &e = potential_->elements();
-  const std::vector<int> negative = work_->negative;
-  const EdgeBlocks exact = potential_->derivatives(rods_).blocks;
-  found->assign(work_->active.size(), false);
-  neutral->assign(work_->active.size(), false);
-  bool regular, done = false;
-  enum class Try { buckling, shifted, shifted_anew };
-  for (const Try way : {Try::buckling, Try::shifted, Try::shifted_anew}) {
-    if (done) break;
-    const bool buckling = way == Try::buckling;
-    potential_->assemble(rods_, buckling ? HessianKind::uncompressed : HessianKind::exact);
-    EdgeBlocks softening = exact;
-    if (buckling) {
-      PetscCall(refactor());
-      PetscCall(readInertia(&regular));
-      if (!regular || report_.negative_pivots > 0) continue;
-      softening.subtractFrom(potential_->blocks());
-    } else {
-      fill(work_->indefinite, true);
-      if (way == Try::shifted_anew) // the last shift, of an iterate far away, drowned the mode
-        for (std::vector<double> *shift : {&work_->shift, &work_->last_shift}) fill(*shift, 0.0);
-      PetscCall(shiftUntilPositive(false));
-    }
-    const bool definite = buckling && report_.zero_pivots == 0;
-    // With A v = b solved, v'K v = v'b - v'(A - K)v: the stiff part of A never enters, whose rounding would hide a
-    // small curvature.
-    auto soften = [&](const Planes &v, Planes &y) { // (A - K) v
-      y.clear();
-      for (int r = rods_.begin; r < rods_.end; ++r) {
-        const RodRange &rod = e.rods[r];
-        if (buckling)
-          softening.multiply(rod, dofs.joins(r), v, y);
-        else
-          addMetric(work_->metric, system_.edge_metric, rod, dofs.joins(r), work_->shift[r], v, y);
-        dofs.fold(rod, y);
-      }
-      dofs.foldJoined(rods_, y);
-    };
-    bool settled = false; // what more iterations would not change
-    for (int start = 0; start < 2 && !done && (start == 0 || settled || definite); ++start) {
-      Planes workspace(slot_size, dofs.slots(rods_));
-      workspace.setOrigin(dofs.rods()[rods_.begin].first_slot);
-      Probe w{workspace, workspace, workspace}, x = w, p = w;
-      beginMode(start);
-      soften(work_->increment, x.soft);
-      std::vector<double> before(neutral->size(), HUGE_VAL);
-      settled = false;
-      for (int k = 0; k < 100 && !settled; ++k) {
-        for (std::size_t n = 0; n < islands_.size() && k > 0; ++n)
-          if (negative[islands_[n].begin] > 0)
-            improve(dofs, islands_[n], w, x, p,
-                    start == 0 ? 1 : std::min(k, 3)); // first by inverse iteration, whose modes are smooth
-        watch().beat();
-        w.stiff = x.soft;
-        PetscCall(solveLinear(w.stiff, w.motion));
-        soften(w.motion, w.soft);
-        done = settled = true;
-        bool told = true; // of every rod, whether there is a way down
-        for (const RodSet island : islands_) {
-          const int r = island.begin;
-          if (negative[r] == 0) continue;
-          const double stiffness = dofs.dot(island, w.motion, w.stiff), softness = dofs.dot(island, w.motion, w.soft);
-          double noise = rounding * std::abs(stiffness);
-          for (int each = r; each < island.end; ++each) noise += hessianNoise(each, w.motion);
-          const double change = softness - stiffness - before[r];
-          before[r] = softness - stiffness;
-          fill(*found, island, k >= enough && softness - stiffness > noise);
-          // Compression that makes up for no mode's stiffness leaves a definite Hessian: its negative pivots are
-          // rounding.
-          fill(*neutral, island,
-               std::abs(softness - stiffness) <= noise || (definite && !(softness > 0.5 * stiffness)));
-          settled = settled && ((*found)[r] || (k >= enough && std::abs(change) < 1e-3 * noise));
-          done = done && (*found)[r];
-          told = told && ((*found)[r] || (*neutral)[r]);
-        }
-        done = done || (settled && told);
-      }
-      for (int r = rods_.begin; r < rods_.end; ++r) {
-        for (int a = 0; a < slot_size; ++a)
-          std::copy(w.motion[a] + e.rods[r].first_slot, w.motion[a] + e.rods[r].vertexEnd() + 2,
-                    work_->increment[a] + e.rods[r].first_slot);
-        dofs.forBeside({r, r + 1}, [&](int s) { work_->increment.setVector(0, s, w.motion.vector(0, s)); });
-      }
-    }
-    done = done || definite || (settled && !buckling);
-  }
-  potential_->assemble(rods_, potential_->step().hessian);
   PetscFunctionReturn(0);
 }
 

@@ -83,8 +83,7 @@ PetscErrorCode NewtonSolver::findLoadReach() {
   loads.setOrigin(dofs.rods()[rods_.begin].first_slot);
   for (int r = rods_.begin; r < rods_.end; ++r) potential_->addLoads(r, loads);
   dofs.foldJoined(rods_, loads.equilibrium);
-  Planes response(slot_size, dofs.slots(rods_));
-  response.setOrigin(loads.equilibrium.origin());
+  Planes response = dofs.makePlanes(rods_);
   PetscCall(solveLinear(loads.equilibrium, response));
   for (int r = rods_.begin; r < rods_.end; ++r) {
     const double reach = sizeOf(r, response),

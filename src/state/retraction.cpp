@@ -63,9 +63,9 @@ void Retraction::setInverseTimeSquared(double value) {
 }
 
 /// Corrections must not kink the rod where a held vertex stands still beside vertices that move: between two held
-/// vertices, at distances a and b, the softness is multiplied by (4ab/(a + b)^2)^2, which leaves position and direction
-/// at both as they are. A vertex that a pin makes q times as soft is held but for q: the factor f becomes q + (1 - q)
-/// f, q linear from one to the other.
+/// vertices, at distances a and b, the softness is multiplied by docs/theory.md (21.5), (4ab/(a + b)^2)^2, which leaves
+/// position and direction at both as they are. A vertex that a pin makes q times as soft is held but for q: the factor
+/// f becomes q + (1 - q) f, q linear from one to the other (21.6).
 void Retraction::stiffenNearHeld(const RodRange &rod, const Elements::Pins &pins) {
   double *soft = work_[softness];
   const double *freedom = elements_.freedom(), *length = elements_.restLength();
@@ -129,8 +129,8 @@ void Retraction::turnArm(const C &from, const Planes &increment, double scale, c
   to.closeRing(elements_.rods[j.rod]);
 }
 
-/// Lengths that edges shall have, and their directions, by the additive positions in `to`; false when an edge vanishes
-/// or turns back on itself.
+/// Lengths that edges shall have, docs/theory.md (21.1) or (21.2), and their directions, by the additive positions in
+/// `to`; false when an edge vanishes or turns back on itself.
 [[gnu::flatten]] bool Retraction::aim(const C &from, const RodRange &rod, RetractionKind kind, const C &to) {
   using std::sqrt;
   for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
@@ -238,39 +238,45 @@ static void moveAll(const RodRange &rod, const Vec3 &by, C &to) {
   return true;
 }
 
-/// Two Newton sweeps that move the vertices between the slots `first` and `last` the least, in the norm of the
-/// softness, towards the target lengths. The compliance of the edges keeps the system regular where the lengths cannot
-/// be met. A closed rod is one span whose last edge meets its first; the corner of its cyclic system enters as a
-/// rank-one change (Sherman and Morrison 1950).
-[[gnu::flatten]] void Retraction::projectSpan(const RodRange &rod, int first, int last, C &to) {
+/// The system of projectSpan, and what it is to correct; the farthest that a length is from its target, over its own.
+[[gnu::flatten]] inline Pack Retraction::measureSpan(const RodRange &rod, int first, int last, C &to) {
   using std::sqrt, std::abs;
+  // Of a length: its last bits are no reason to move vertices, many times as far where a span is nearly straight.
+  constexpr double rounding = 4 * std::numeric_limits<double>::epsilon();
+  double *soft = work_[softness], *diag = work_[diagonal], *up = work_[upper], *rhs = work_[right];
+  Pack farthest(0.0);
+  if (rod.closed) {
+    to.closeRing(rod);
+    soft[last] = soft[first];
+  }
+  for (int s = first; s < last; s += lanes) {
+    const Pack::mask_type live = firstLanes(last - s);
+    const Vector3<Pack> e = to.edges<Pack>(s);
+    const Pack length = sqrt(e.squaredNorm());
+    for (int a = 0; a < 3; ++a) write(work_[direction + a] + s, select(live, Pack(e[a] / length), Pack(0.0)));
+    const Pack wrong = length - read<Pack>(work_[target] + s);
+    write(rhs + s, select(live && Pack(abs(wrong)) > length * Pack(rounding), wrong, Pack(0.0)));
+    farthest = max(farthest, Pack(abs(read<Pack>(rhs + s)) * read<Pack>(elements_.inverseRestLength() + s)));
+    const Pack compliance = read<Pack>(elements_.restLength() + s) / read<Pack>(elements_.axialStiffness() + s);
+    write(diag + s, select(live, Pack(read<Pack>(soft + s) + read<Pack>(soft + s + 1) + compliance), Pack(1.0)));
+  }
+  for (int s = first; s < last - 1; s += lanes)
+    write(up + s, Pack(-read<Pack>(soft + s + 1) *
+                       readVector<Pack>(work_, direction, s).dot(readVector<Pack>(work_, direction, s + 1))));
+  return farthest;
+}
+
+/// Newton sweeps, two or more, that move the vertices between the slots `first` and `last` the least, in the norm of
+/// the softness, towards the target lengths: docs/theory.md (21.3), (21.4). The compliance of the edges keeps the
+/// system regular where the lengths cannot be met. A closed rod is one span whose last edge meets its first; the corner
+/// of its cyclic system enters as a rank-one change (Sherman and Morrison 1950).
+[[gnu::flatten]] void Retraction::projectSpan(const RodRange &rod, int first, int last, C &to) {
   double *soft = work_[softness], *diag = work_[diagonal], *up = work_[upper], *rhs = work_[right], *z = work_[corner];
   const int end = last - 1;
   constexpr int most_sweeps = 10;
-  // Of a length: its last bits are no reason to move vertices, sideways and many times as far where a span is nearly
-  // straight.
-  constexpr double rounding = 4 * std::numeric_limits<double>::epsilon();
   double before = HUGE_VAL;
   for (int sweep = 0; sweep < most_sweeps; ++sweep) {
-    Pack farthest(0.0);
-    if (rod.closed) {
-      to.closeRing(rod);
-      soft[last] = soft[first];
-    }
-    for (int s = first; s < last; s += lanes) {
-      const Pack::mask_type live = firstLanes(last - s);
-      const Vector3<Pack> e = to.edges<Pack>(s);
-      const Pack length = sqrt(e.squaredNorm());
-      for (int a = 0; a < 3; ++a) write(work_[direction + a] + s, select(live, Pack(e[a] / length), Pack(0.0)));
-      const Pack wrong = length - read<Pack>(work_[target] + s);
-      write(rhs + s, select(live && Pack(abs(wrong)) > length * Pack(rounding), wrong, Pack(0.0)));
-      farthest = max(farthest, Pack(abs(read<Pack>(rhs + s)) * read<Pack>(elements_.inverseRestLength() + s)));
-      const Pack compliance = read<Pack>(elements_.restLength() + s) / read<Pack>(elements_.axialStiffness() + s);
-      write(diag + s, select(live, Pack(read<Pack>(soft + s) + read<Pack>(soft + s + 1) + compliance), Pack(1.0)));
-    }
-    for (int s = first; s < end; s += lanes)
-      write(up + s, Pack(-read<Pack>(soft + s + 1) *
-                         readVector<Pack>(work_, direction, s).dot(readVector<Pack>(work_, direction, s + 1))));
+    const Pack farthest = measureSpan(rod, first, last, to);
     double cyclic = 0, gamma = 0;
     if (rod.closed) {
       cyclic = -soft[first] * work_.vector(direction, first).dot(work_.vector(direction, end));
@@ -307,9 +313,10 @@ static void moveAll(const RodRange &rod, const Vec3 &by, C &to) {
   if (rod.closed) to.closeRing(rod);
 }
 
-[[gnu::flatten]] bool Retraction::updateFrames(const C &from, const Planes &increment, double scale, int r,
-                                               C &to) const {
-  using std::floor, std::sqrt;
+/// Frames, lengths and strains of edges by the positions in `to`; false when one vanishes or turns back on itself.
+[[gnu::flatten]] inline bool Retraction::turnEdges(const C &from, const Planes &increment, double scale, int r,
+                                                   C &to) const {
+  using std::sqrt;
   const RodRange &rod = elements_.rods[r];
   const Energy energy = elements_.energy[r];
   const bool turns = rod.twist;
@@ -335,6 +342,13 @@ static void moveAll(const RodRange &rod, const Vec3 &by, C &to) {
     write(to[C::strain] + s, axialStrain<Pack>(energy, kept, read<Pack>(elements_.inverseRestLength() + s)));
   }
   to.closeRing(rod);
+  return true;
+}
+
+[[gnu::flatten]] bool Retraction::updateFrames(const C &from, const Planes &increment, double scale, int r,
+                                               C &to) const {
+  using std::floor;
+  if (!turnEdges(from, increment, scale, r, to)) return false;
   auto move = [&](int slot) {
     Vec3 high = from.positionAt(slot), low = from.values().vector(C::position_low, slot);
     for (int a = 0; a < 3; ++a) addTwoWords(high[a], low[a], scale * increment[a][slot]);
@@ -366,7 +380,7 @@ static void moveAll(const RodRange &rod, const Vec3 &by, C &to) {
   // holonomy. Half a turn is a barrier of the measure `tan`: no step leads across it.
   bool possible = true;
   const bool barrier = elements_.measure[r] == Measure::tan;
-  if (rod.isReduced()) return !barrier || !foldsOver(elements_, from, to, r);
+  if (elements_.rods[r].isReduced()) return !barrier || !foldsOver(elements_, from, to, r);
   forCells(elements_, r, [&]<class T>(const LooseCell &cell, int count) {
     auto turned = [&](int frame) { return T(read<T>(to[C::spin] + frame) - read<T>(from[C::spin] + frame)); };
     const T expected = read<T>(from[C::twist] + cell.slot) + turned(cell.frame1) - turned(cell.frame0);

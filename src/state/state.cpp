@@ -175,13 +175,10 @@ Frame joinedFrame(const State &state, const Elements &elements, const JoinedEdge
   return {turned * drawn.tangent, turned * drawn.director, 1};
 }
 
-[[gnu::flatten]] void setRod(const State &state, const Elements &elements, int r, Configuration &c) {
+/// Positions, directors and axial forces of a rod, plane by plane, as a state has them.
+static void setOwn(const State &state, const RodRange &rod, Configuration &c) {
   using C = Configuration;
-  using std::sqrt;
-  const RodRange &rod = elements.rods[r];
-  for (int n = elements.rod_cells[r]; n < elements.rod_cells[r + 1]; ++n)
-    c[C::winding][elements.cell_slot[n]] = state.winding[n];
-  for (int a = 0; a < 3; ++a) { // plane by plane
+  for (int a = 0; a < 3; ++a) {
     double *high = c[C::Plane(C::position + a)] + rod.first_slot,
            *low = c[C::Plane(C::position_low + a)] + rod.first_slot;
     for (int i = 0; i < rod.vertices; ++i) {
@@ -198,6 +195,13 @@ Frame joinedFrame(const State &state, const Elements &elements, const JoinedEdge
     c[C::axial_force][rod.slot(i)] = state.axial_force[rod.first_edge + i];
     c[C::spin][rod.slot(i)] = 0;
   }
+}
+
+/// Tangents, lengths and strains of edges, by their vertices.
+static void measureEdges(const Elements &elements, int r, Configuration &c) {
+  using C = Configuration;
+  using std::sqrt;
+  const RodRange &rod = elements.rods[r];
   for (int s = rod.first_slot; s < rod.edgeEnd(); s += lanes) {
     const Pack::mask_type live = firstLanes(rod.edgeEnd() - s);
     const Vector3<Pack> e = c.edges<Pack>(s);
@@ -211,6 +215,10 @@ Frame joinedFrame(const State &state, const Elements &elements, const JoinedEdge
           axialStrain<Pack>(elements.energy[r], length, read<Pack>(elements.inverseRestLength() + s)));
   }
   c.closeRing(rod);
+}
+
+/// Bodies beside a rod, and what is tied to bodies.
+static void setBodies(const State &state, const Elements &elements, int r, Configuration &c) {
   auto setTurned = [&](int slot, int group) {
     const Mat3 turned = rotationOf(state, group);
     c.setFrame(slot, {turned.col(0), turned.col(1), 1});
@@ -229,6 +237,15 @@ Frame joinedFrame(const State &state, const Elements &elements, const JoinedEdge
       for (int a = 0; a < 3; ++a) addTwoWords(high[a], low[a], arm[a]);
       c.setPosition(j.slot, high, low);
     }
+}
+
+[[gnu::flatten]] void setRod(const State &state, const Elements &elements, int r, Configuration &c) {
+  using C = Configuration;
+  for (int n = elements.rod_cells[r]; n < elements.rod_cells[r + 1]; ++n)
+    c[C::winding][elements.cell_slot[n]] = state.winding[n];
+  setOwn(state, elements.rods[r], c);
+  measureEdges(elements, r, c);
+  setBodies(state, elements, r, c);
   for (const JoinedEdge &j : elements.joinedEdges({r, r + 1})) {
     c.setFrame(j.frame, joinedFrame(state, elements, j));
     c.setPosition(j.frame, Vec3::Zero(), Vec3::Zero());

@@ -75,13 +75,16 @@ TEST(Neighbours, AreFoundByTheGridAsByLookingAtAll) {
     Simulation sim;
     sim.describe(scene, true);
     const Neighbours neighbours(sim.scene, *sim.elements);
-    Room room;
-    for (const Vec3 &x : sim.state.position) {
-      room.start.push_back(x);
-      room.way.push_back(0.01 * random.vector());
-      room.beyond.push_back(0.01 * std::abs(random()));
+    Room room(sim.elements->slots, 12);
+    for (std::size_t r = 0; r < 12; ++r) {
+      const RodRange &rod = sim.elements->rods[r];
+      for (int i = 0; i < rod.vertices; ++i) {
+        room.start.setVector(0, rod.slot(i), sim.state.position[std::size_t(rod.first_vertex + i)]);
+        room.way.setVector(0, rod.slot(i), 0.01 * random.vector());
+      }
+      room.beyond[r] = 0.01 * std::abs(random());
+      room.bend[r] = std::abs(random());
     }
-    for (int r = 0; r < 12; ++r) room.bend.push_back(std::abs(random()));
     const std::vector<TouchingPair> grid = neighbours.find(room), all = neighbours.findByAll(room);
     ASSERT_EQ(grid.size(), all.size());
     found += grid.size();

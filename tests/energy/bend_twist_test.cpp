@@ -8,7 +8,8 @@ namespace {
 using DCell = Dual<cell_size>;
 
 /// The retracted frame of an edge whose ends move by u0, u1 and whose director turns by theta.
-FrameOf<DCell> moved(const Frame &f, const Vector3<DCell> &u0, const Vector3<DCell> &u1, const DCell &theta, bool free) {
+FrameOf<DCell> moved(const Frame &f, const Vector3<DCell> &u0, const Vector3<DCell> &u1, const DCell &theta,
+                     bool free) {
   const Vector3<DCell> tangent = f.tangent.cast<DCell>(), director = f.director.cast<DCell>();
   if (!free) return {tangent, director, DCell(f.length)};
   const Vector3<DCell> e = tangent * DCell(f.length) + u1 - u0;
@@ -22,7 +23,7 @@ template <Measure measure> DCell referenceEnergy(const RandomCell &c) {
   for (int k = 0; k < cell_size; ++k) q[k] = DCell::variable(0.0, k);
   const Vector3<DCell> u0(q[0], q[1], q[2]), u1(q[4], q[5], q[6]), u2(q[8], q[9], q[10]);
   const FrameOf<DCell> f0 = moved(c.f0, u0, u1, q[3], c.cell.free[0] != 0),
-                   f1 = moved(c.f1, u1, u2, q[7], c.cell.free[1] != 0);
+                       f1 = moved(c.f1, u1, u2, q[7], c.cell.free[1] != 0);
   return cellEnergy<measure>(f0, f1, cast<DCell>(c.cell));
 }
 

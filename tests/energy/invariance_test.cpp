@@ -150,7 +150,7 @@ TEST(Stretch, DerivativesMatchAutomaticDifferentiation) {
     std::array<D4, 4> q;
     for (int k = 0; k < 4; ++k) q[k] = D4::variable(0, k);
     const D4 strain = axialStrain<D4>(energy, moved(c.f1, q).length, D4(inverse)) - D4(rest),
-            reference = D4(0.5 * stiffness / inverse) * strain * strain;
+             reference = D4(0.5 * stiffness / inverse) * strain * strain;
     const double force = stiffness * (axialStrain(energy, c.f1.length, inverse) - rest),
                  slope = strainSlope(energy, c.f1.length, inverse);
     const Vec3 g = stretchGradient(c.f1, force, slope);

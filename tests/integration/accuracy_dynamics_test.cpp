@@ -145,16 +145,14 @@ TEST(AccuracyInDynamics, OfCopiesIsThatOfOne) {
   SceneFile file = sceneFile("cantilever");
   const Accuracy accuracy{1e-2};
   Choice one, all;
-  EXPECT_PETSC(
-      chooseResolution(file.scene, file.drawings, methodAt("generalized_alpha", 0.005, 0.5), accuracy, &one));
+  EXPECT_PETSC(chooseResolution(file.scene, file.drawings, methodAt("generalized_alpha", 0.005, 0.5), accuracy, &one));
   for (int r = 1; r < 3; ++r) {
     file.scene.rods.push_back(file.scene.rods[0]);
     file.drawings.push_back(file.drawings[0]);
     file.scene.supports.push_back(file.scene.supports[0]);
     file.scene.supports[r].rod = r;
   }
-  EXPECT_PETSC(
-      chooseResolution(file.scene, file.drawings, methodAt("generalized_alpha", 0.005, 0.5), accuracy, &all));
+  EXPECT_PETSC(chooseResolution(file.scene, file.drawings, methodAt("generalized_alpha", 0.005, 0.5), accuracy, &all));
   EXPECT_EQ(all.edges, std::vector<int>(3, one.edges[0]));
   EXPECT_EQ(all.error, std::vector<double>(3, one.error[0]));
   EXPECT_EQ(all.loop.dt, one.loop.dt);

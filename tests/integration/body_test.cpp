@@ -191,8 +191,8 @@ TEST(Bodies, AWeightlessBodyIsARigidJunction) {
   }
 }
 
-/// A body on a taut rod that swings: however stiff the rod, steps take about the same iterations (the straight way of the
-/// body's end stretches it by squares).
+/// A body on a taut rod that swings: however stiff the rod, steps take about the same iterations (the straight way of
+/// the body's end stretches it by squares).
 TEST(Bodies, ATautRodTakesNoMoreIterations) {
   for (const bool weld : {true, false}) {
     int least = 1 << 30, most = 0;

@@ -65,13 +65,13 @@ struct SlidingForce {
   Mat3 hessian = Mat3::Zero();
 };
 /// Of a way u: normal force times coefficient times rho(|u across the normal, from the anchor|), with rho(u) =
-/// u^2/a - u^3/(3 a^2) up to the fall-off a and u - a/3 beyond; and with dampings of the contact, that force times
-/// damping/2 u^2 over the time. Where nothing slides, what held before and a spring take the place of friction, which
-/// reaches `pressing` at the fall-off.
+/// u^2/a - u^3/(3 a^2) up to the fall-off a and u - a/3 beyond, docs/theory.md (17.6); and with dampings of the
+/// contact, that force times damping/2 u^2 over the time (17.8). Where nothing slides (17.7), what held before and a
+/// spring take the place of friction, which reaches `pressing` at the fall-off.
 SlidingForce slidingForce(const SlidingPoint &point, const ContactSettings &settings, const Sliding &sliding,
                           const Vec3 &way);
 
-/// What friction and damping two have between them: the geometric means count.
+/// What friction and damping two have between them: the geometric means count, docs/theory.md (19.3).
 ContactSettings bothSlide(const ContactSettings &a, const ContactSettings &b);
 
 /// Takes points as they touch now in place of those before, both in one order. Where rounds swing, they are led to the

@@ -36,7 +36,7 @@ private:
   double width_, threshold_, smoothing_, stiffness_;
 
   /// Barrier of Li et al. 2020 (Incremental potential contact, eq. 6) scaled as in Li et al. 2023 (Convergent IPC):
-  /// with t the part of `distance` between wall and reach, -stiffness distance (t - 1)^2 ln t.
+  /// with t the part of the width between wall and reach, -stiffness width (t - 1)^2 ln t, docs/theory.md (17.2).
   GapLaw barrier(double between) const {
     const double t = between / width_ + 0.5;
     if (!(t > 0)) return {std::numeric_limits<double>::infinity(), 0, 0};
@@ -46,7 +46,7 @@ private:
   }
 
   /// stiffness/2 h^2 of a ramp h with two continuous derivatives, which is linear from 2 x smoothing behind the
-  /// threshold.
+  /// threshold: docs/theory.md (17.3).
   GapLaw penalty(double between) const {
     const double e = smoothing_, depth = threshold_ - between, u = depth / e, k = stiffness_;
     double h = depth - e, slope = 1, bend = 0;

@@ -13,9 +13,13 @@ namespace tendril {
 /// Where the vertices of the scene may be: those of a rod have all gone the same part of their ways from where they
 /// were, and are no farther from there than so much [m]; nor are edges from where that takes them, over their length.
 struct Room {
-  std::vector<Vec3> start, way;
-  std::vector<double> beyond;
-  std::vector<double> bend; ///< per rod
+  Planes start, way;                ///< over slots
+  std::vector<double> beyond, bend; ///< per rod
+  Room() = default;
+  Room(int slots, std::size_t rods) : start(3, slots), way(3, slots), beyond(rods, 0), bend(rods, 0) {}
+  Vec3 startOf(int slot) const { return start.vector(0, slot); }
+  Vec3 wayOf(int slot) const { return way.vector(0, slot); }
+  Vec3 endOf(int slot) const { return startOf(slot) + wayOf(slot); }
 };
 
 class Neighbours {
@@ -43,6 +47,11 @@ private:
   struct Joint {
     double arc, to_arc, apart;
   };
+  /// Neighbouring edges of a rod, and the box in which they may be.
+  struct Chunk {
+    int rod, begin, end;
+    Box box;
+  };
   const Scene &scene_;
   const Elements &elements_;
   std::vector<double> arc_;   ///< per vertex
@@ -56,6 +65,10 @@ private:
   bool isApart(const Room &room, int rod, int edge, int to_edge) const;
   bool isNear(const Room &room, int rod, int edge, int to_rod, int to_edge) const;
   TouchingPair pairOf(int rod, int edge, int to_rod, int to_edge) const;
+  double reachOf(const Room &room, int rod) const;
+  std::vector<char> meeting(const Room &room) const;
+  std::vector<Chunk> chunksOf(const Room &room) const;
+  void addPairs(const Room &room, const Chunk &a, const Chunk &b, std::vector<TouchingPair> &pairs) const;
   void addJoint(int rod, int vertex, int to_rod, int to_vertex);
 };
 

@@ -1,6 +1,7 @@
 #pragma once
 /// \file pair_derivatives.hpp
-/// Derivatives of what two edges, an edge and a body, or two bodies do to each other.
+/// Derivatives of what two edges, an edge and a body, or two bodies do to each other, by the points that they carry:
+/// first ones docs/theory.md (9.1) and (18.3), second ones as in addCurvature of carrier.hpp.
 
 #include "tendril/contact/friction.hpp"
 #include "tendril/energy/carrier.hpp"
@@ -52,11 +53,11 @@ struct SlidingPair {
     return pair.number == b.pair.number && side == b.side && sample == b.sample;
   }
 };
-/// Adds derivatives of what friction does to it by the variables of the pair.
+/// Adds derivatives of what friction does to it by the variables of the pair, docs/theory.md (17.9) on both sides.
 void addFriction(const SlidingPair &p, const SlidingForce &force, const Configuration &c, HessianKind kind,
                  OfPair &out);
 
-/// What an energy by the place of a sample on the skin of a rod, relative to a body, does to both.
+/// What an energy by the place of a sample on the skin of a rod, relative to a body, does to both: (18.2), (20.2).
 struct OnSkinOfPair {
   const EdgePoint &point;
   Vec3 gradient; ///< by the place of the sample

@@ -1,6 +1,7 @@
 #pragma once
 /// \file pair_friction.hpp
-/// Friction and damping of rods and bodies that touch each other.
+/// Friction and damping of rods and bodies that touch each other, docs/theory.md, 19: (17.6) to (17.8) of what both
+/// have, (19.3).
 
 #include "tendril/contact/pair_derivatives.hpp"
 

@@ -141,6 +141,9 @@ private:
   bool mayTouch(int body, int other) const;
   void makeRoom(const Configuration &start, const Planes *way, double room) const;
   bool isInRoom(const Configuration &from, const Configuration &to, double part, int rod) const;
+  void addPair(int rod, int edge, std::array<int, 2> slot, int to_rod, int to_edge, std::array<int, 2> to_slot) const;
+  void takePairsOf(int body) const;
+  void numberPairs() const;
   void take() const;
   NormalLaw makeLaw(const TouchingPair &p) const;
   std::span<const SamplePoint> pointsFor(int rod, int body) const;

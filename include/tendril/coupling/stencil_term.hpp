@@ -2,7 +2,7 @@
 /// \file stencil_term.hpp
 /// Terms made of stencils: each acts on a few sites, with a value and small dense derivatives of its own. What loops
 /// over them and takes them into the matrix is here, once. To add a coupling, write a file with a class as Stencil
-/// below and one line in the list of couplings.cpp.
+/// below and its maker, declare that in couplings.hpp, and enter it in the list of couplings.cpp.
 
 #include "tendril/energy/term.hpp"
 

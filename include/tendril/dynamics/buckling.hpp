@@ -57,6 +57,10 @@ private:
     State below; ///< equilibrium just below
     Rates shape;
   };
+  /// The last point of the path, and the one before it.
+  struct Stretch {
+    Point at, before;
+  };
   StepSolver &solver_;
   LoopSettings settings_;
   int count_, asked_ = 0;
@@ -79,6 +83,10 @@ private:
   double lengthOfAll() const;
   PetscErrorCode locateAll(const Point &at, const Point &next, bool *snapped);
   PetscErrorCode note(std::vector<Root> &roots);
+  PetscErrorCode take(Point &point, Stretch &along, State &state);
+  PetscErrorCode look(const Point &at, Point &next);
+  PetscErrorCode goAround(const Stretch &along, double target, Point *next, State &state);
+  PetscErrorCode follow(Stretch &along, State &state, bool *stopped);
 };
 
 } // namespace tendril

@@ -107,6 +107,8 @@ private:
     ExactSum carried;                 ///< see Diagnostics
     double gap = HUGE_VAL;            ///< smallest between surfaces in contact [m]
     StepError error;
+    bool first = false;      ///< no step was taken before: the energy of the start is this loop's
+    bool begins = false;     ///< the method has no memory but what it began with
     bool too_coarse = false; ///< for the error asked for
     bool stops = false;      ///< whether the run is asked to end
     void commit(const IncrementalPotential &potential, RodSet rods, State *next);
@@ -116,7 +118,9 @@ private:
     }
   };
   void prepare(const State &state);
+  Attempt attemptFrom(const State &state) const;
   PetscErrorCode attempt(const State &state, State *next, Attempt *now);
+  PetscErrorCode remodel(State &state, State *next, const Attempt &now, bool *anew, bool *ends);
   bool mayPassCritical(const State &state, const NewtonReport &report) const;
   void measure(const State &state, const State &next, Attempt *now);
   void accept(State &state, State &next, Attempt *now, Work *work);
@@ -136,6 +140,7 @@ private:
   double nextStep(double time, double *landing) const;
   bool adapt(double h, double dt_min, const StepError &error);
   PetscErrorCode locate(State &start, const Step &step, bool *moved);
+  PetscErrorCode goToCritical(State &state, const Step &step, Work *work, bool *moved, bool *finished);
   bool isThorough() const;
   PetscErrorCode locateNext(const State &start, const Step &step, CriticalPoint *point, bool *found);
   Guess alongMode(const State &start, const Step &step);

@@ -2,7 +2,7 @@
 /// \file bend.hpp
 /// Bending energy of one cell of a rod without twists (RodModel): a function of the angle between two edges alone, in a
 /// plane, where it has a sign and a rest, or in space, where the rod is isotropic and straight at rest. The strains are
-/// those of strain.hpp; docs/theory.md, Models, derives the derivatives.
+/// those of strain.hpp; numbers in brackets are of docs/theory.md, 5.
 
 #include "tendril/model/strain.hpp"
 
@@ -27,7 +27,7 @@ template <class T> T stretchOf(const BendOf<T> &cell, const T &l0, const T &l1) 
   return (cell.weight[0] * l0 + cell.weight[1] * l1) + cell.base;
 }
 
-/// 2 tan(angle/2) or the angle, with its sign, from t0 to t1 in their plane; and derivatives by the angle.
+/// 2 tan(angle/2) or the angle, with its sign, from t0 to t1 in their plane: y of (5.1); and derivatives by the angle.
 template <Measure measure, class T> std::array<T, 3> planarAngle(const VectorOf<T, 2> &t0, const VectorOf<T, 2> &t1) {
   const T tangent = (t0[0] * t1[1] - t0[1] * t1[0]) / (T(1.0) + t0.dot(t1)); // of half the angle
   if constexpr (measure == Measure::tan) {
@@ -37,8 +37,8 @@ template <Measure measure, class T> std::array<T, 3> planarAngle(const VectorOf<
     return {T(2.0) * tangent * angleFactor<T>(tangent * tangent).value, T(1.0), T(0.0)};
 }
 
-/// Half the square of 2 tan(angle/2) or of the angle, and two derivatives by the cosine c of the angle. With z =
-/// tan^2(angle/2): dz/dc = -2/(1 + c)^2.
+/// w of (5.4), half the square of 2 tan(angle/2) or of the angle, and two derivatives by the cosine c of the angle.
+/// With z = tan^2(angle/2): dz/dc = -2/(1 + c)^2.
 template <Measure measure, class T> std::array<T, 3> halfSquare(const VectorOf<T, 3> &t0, const VectorOf<T, 3> &t1) {
   const T inverse = T(1.0) / (T(1.0) + t0.dot(t1)), z = t0.cross(t1).squaredNorm() * inverse * inverse;
   std::array<T, 3> w{T(2.0) * z, T(2.0), T(0.0)}; // by z
@@ -51,7 +51,7 @@ template <Measure measure, class T> std::array<T, 3> halfSquare(const VectorOf<T
   return {w[0], w[1] * slope, w[2] * slope * slope - T(2.0) * w[1] * slope * inverse};
 }
 
-/// Energy of a cell [J].
+/// Energy of a cell [J]: (5.1) in a plane, stiffness stretch^2 w in space.
 template <Measure measure, class T, int n> T bendEnergy(const EdgePair<T, n> &e, const BendOf<T> &cell) {
   const T stretch = stretchOf(cell, e.l0, e.l1);
   if constexpr (n == 2) {
@@ -76,15 +76,15 @@ template <class T, int n> struct BendDerivatives {
   Eigen::Matrix<T, n, n> own0, own1, mixed; ///< Hessian; of own0 and own1 the upper triangles; mixed: first by second
 };
 
-/// Derivatives of a cell's energy over its two edge vectors, exact; where not `exact`, a Hessian that is never
-/// indefinite: without second derivatives of the strains, but of what turns edges.
+/// Derivatives of a cell's energy over its two edge vectors by (5.2) or (5.3), exact; where not `exact`, a Hessian that
+/// is never indefinite: without second derivatives of the strains, but of what turns edges.
 template <Measure measure, bool exact = true, class T>
 BendDerivatives<T, 2> bendDerivatives(const EdgePair<T, 2> &e, const BendOf<T> &cell) {
   BendDerivatives<T, 2> d;
   const T i0 = cell.free[0] / e.l0, i1 = cell.free[1] / e.l1, stretch = stretchOf(cell, e.l0, e.l1);
   const std::array<T, 3> angle = planarAngle<measure, T>(e.t0, e.t1);
   const T force = cell.stiffness * (stretch * angle[0] - cell.rest);
-  // The angle by the edges: n x t / l with the signs - and +; the stretch: t.
+  // The angle by the edges, (5.2): n x t / l with the signs - and +; the stretch: t.
   const VectorOf<T, 2> m0(e.t0[1] * i0, -e.t0[0] * i0), m1(-e.t1[1] * i1, e.t1[0] * i1);
   const T w0 = cell.weight[0] * cell.free[0], w1 = cell.weight[1] * cell.free[1];
   const T turning = stretch * angle[1];
@@ -103,7 +103,7 @@ BendDerivatives<T, 2> bendDerivatives(const EdgePair<T, 2> &e, const BendOf<T> &
       d.mixed(r, c) = k0 * y1[c];
     }
   if constexpr (!exact) return d;
-  // y'' = stretch f'' a' a' + stretch f' a'' + f' (a' s' + s' a') + f s''; along an edge, a'' = -+ (m t + t m)/l.
+  // y'' = stretch f'' a' a' + stretch f' a'' + f' (a' s' + s' a') + f s''; by one edge a'' = -(a' t' + t a'')/l (5.2).
   const T bent = force * stretch * angle[2], turned = force * turning, mixed = force * angle[1];
   const T c0 = mixed * w0 - turned * i0, c1 = mixed * w1 - turned * i1;
 #pragma GCC unroll 2
@@ -129,7 +129,7 @@ BendDerivatives<T, 3> bendDerivatives(const EdgePair<T, 3> &e, const BendOf<T> &
   const T cosine = e.t0.dot(e.t1), twice = cell.stiffness * T(2.0) * stretch;
   const T first = cell.stiffness * stretch * stretch * w[1], second = cell.stiffness * stretch * stretch * w[2];
   const T w0 = cell.weight[0] * cell.free[0], w1 = cell.weight[1] * cell.free[1];
-  // The cosine by the edges.
+  // The cosine by the edges, (5.3).
   const VectorOf<T, 3> p0 = (e.t1 - e.t0 * cosine) * i0, p1 = (e.t0 - e.t1 * cosine) * i1;
   d.first = p0 * first + e.t0 * (twice * w[0] * w0);
   d.second = p1 * first + e.t1 * (twice * w[0] * w1);

@@ -2,7 +2,7 @@
 /// \file capstan.hpp
 /// Friction of a tendon on what it runs over. Where its direction turns by an angle theta, the tensions T on both sides
 /// of one that slides are apart by the factor exp(mu theta) (L. Euler 1769; Johnson, *Contact Mechanics*, 1985, 8.1 for
-/// creep before it slides). docs/theory.md derives what a step makes of it.
+/// creep before it slides): docs/theory.md (10.8), and what a step makes of it.
 
 #include "tendril/energy/tendon.hpp"
 
@@ -10,7 +10,7 @@ namespace tendril {
 
 /// Over the tension that comes in: the potential of the friction at a place by which u has passed towards the end of
 /// the path, and its derivatives. With a = exp(c) - 1 towards the end and 1 - exp(-c) back, v = |u|/slip:
-/// a slip (v^2 - v^3/3) up to v = 1, a (|u| - slip/3) beyond: its derivative is within -a, and a.
+/// a slip (v^2 - v^3/3) up to v = 1, a (|u| - slip/3) beyond, docs/theory.md (10.9): its derivative is within both a.
 struct CapstanLaw {
   double value = 0, slope = 0, curvature = 0; ///< [m], [1], [1/m]
   CapstanLaw(double u, double exponent, double slip);

@@ -46,9 +46,9 @@ TouchingPair pairOf(const Carrier &a, const Carrier &b);
 
 /// Where the frame of the carrier has taken its part of a point: arm in the axes of the world [m].
 Vec3 armOf(const Carrier &carrier, const CarriedPoint &point, const Configuration &c);
-/// Derivatives of a point.
+/// Derivatives of a point: docs/theory.md (9.1) of a body, (18.3) of an edge.
 Carrier::By byPoint(const Carrier &carrier, const CarriedPoint &point, const Configuration &c);
-/// Adds the second derivatives of g.y, with the point y.
+/// Adds the second derivatives of g.y, with the point y: docs/theory.md (9.1), of an edge over its variables by (16.5).
 void addCurvature(const Carrier &carrier, const CarriedPoint &point, const Vec3 &g, const Configuration &c,
                   Eigen::Ref<Carrier::Hessian, 0, Eigen::OuterStride<>> hessian);
 /// Adds what a carrier has with itself to both of the gradients, and to the blocks: of an edge by its first vertex, its

@@ -36,8 +36,8 @@ template <class T> CellOf<T> cellOf(const Planes &cells, const Configuration &c,
 }
 
 /// Frames and constants of a cell (or a pack of `count` cells) as its energy wants them. Of a rod in space whose twists
-/// are no unknowns the second director goes with the first: held ones may have turned ahead of those that follow at the
-/// end of a step. \param cells constants, as Elements::cells()
+/// are no unknowns the second director goes with the first by (1.1) of docs/theory.md: held ones may have turned ahead
+/// of those that follow at the end of a step. \param cells constants, as Elements::cells()
 template <class T>
 std::pair<std::array<FrameOf<T>, 2>, CellOf<T>> presentCell(const Elements &elements, const Planes &cells,
                                                             const Configuration &c, int rod, const LooseCell &cell,
@@ -49,7 +49,8 @@ std::pair<std::array<FrameOf<T>, 2>, CellOf<T>> presentCell(const Elements &elem
   return {f, readCell<T>(cells, cell.slot)};
 }
 
-/// Present strains of a cell (or a pack of `count` cells), integrated over it [rad].
+/// Present strains of a cell (or a pack of `count` cells), integrated over it [rad]: docs/theory.md (3.2), (3.4),
+/// without the rest.
 template <class T>
 std::array<T, 3> presentStrain(const Elements &elements, const Configuration &configuration, int rod,
                                const LooseCell &cell, int count = 1) {

@@ -1,14 +1,15 @@
 #pragma once
 /// \file edge.hpp
-/// Energies of one edge: stretch, of either law, and the inertia of its twist over a step.
+/// Energies of one edge: stretch, of either law, and the inertia of its twist over a step. Numbers in brackets are of
+/// docs/theory.md.
 
 #include "tendril/model/strain.hpp"
 
 namespace tendril {
 
-/// Derivatives of the stretch energy over the edge vector e = l t: gradient = force q with q = slope e (strainSlope),
-/// Hessian = (stiffness/L) q q' + tension slope I, for `classical` I - t t'. In the primal form tension = force = k
-/// (strain - rest).
+/// Derivatives (2.2) of the stretch energy over the edge vector e = l t: gradient = force q with q = slope e
+/// (strainSlope), Hessian = (stiffness/L) q q' + tension slope I, for `classical` I - t t'. In the primal form tension
+/// = force = k (strain - rest).
 template <class T> Vector3<T> stretchGradient(const FrameOf<T> &f, const T &force, const T &slope) {
   return f.tangent * (force * f.length * slope);
 }
@@ -23,15 +24,15 @@ Matrix3<T> stretchHessian(Energy energy, const FrameOf<T> &f, const T &stiffness
   return h;
 }
 
-/// Twist of an edge since the beginning of the step: the angle from the frame it had then, transported directly to the
-/// present tangent, to its present director. It depends on the end points of the step only, not on the iterates
+/// Twist of an edge since the beginning of the step: the angle (1.2) from the frame it had then, transported directly
+/// to the present tangent, to its present director. It depends on the end points of the step only, not on the iterates
 /// between.
 template <class T> T twistIncrement(const FrameOf<T> &start, const FrameOf<T> &now) {
   return halfAngleBetween(start, now).angle();
 }
 
 /// Gradient (4) over (e, theta) and Hessian (upper triangle of 4x4, row by row) of weight/2 (twist increment -
-/// target)^2, given that difference.
+/// target)^2, given that difference, by (14.3).
 template <class T> struct TwistInertiaDerivatives {
   std::array<T, 4> gradient;
   std::array<T, 10> hessian;

@@ -1,6 +1,6 @@
 #pragma once
 /// \file edge_point.hpp
-/// Points that edges carry with their frames, and derivatives of what acts on them.
+/// Points that edges carry with their frames, and derivatives of what acts on them (docs/theory.md, 18).
 
 #include "tendril/energy/term.hpp"
 #include "tendril/state/state.hpp"
@@ -13,7 +13,7 @@ struct CarriedPoint {
   Vec3 arm;  ///< from there along tangent and both directors, or from the centre of mass as drawn [m]
 };
 
-/// What moves at e + arm by the edge's vector and twist.
+/// What moves at e + arm by the edge's vector and twist: P of docs/theory.md (18.3).
 using ByEdge = Eigen::Matrix<double, 3, edge_size>;
 ByEdge byEdge(const CarriedPoint &point, const Frame &frame);
 
@@ -40,8 +40,8 @@ Vec3 placeOf(const EdgePoint &point, const Configuration &c);
 Vec3 motionOf(const EdgePoint &point, const Configuration &c, const Planes &increment);
 /// Adds what a vector does at it to the unknowns of its rod.
 void spread(const EdgePoint &point, const Vec3 &value, const Configuration &c, Planes &out);
-/// Adds the derivatives of an energy by its place to those of its rod. \param curved whether with the second
-/// derivatives of its place \param blocks or null
+/// Adds the derivatives of an energy by its place to those of its rod: by docs/theory.md (18.2), on the axis (17.5).
+/// \param curved whether with the second derivatives of its place \param blocks or null
 void addAt(const EdgePoint &point, const Vec3 &gradient, const Mat3 &hessian, bool curved, const Configuration &c,
            const BlockPlanes *blocks, Derivatives &out);
 

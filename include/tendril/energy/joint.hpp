@@ -1,7 +1,7 @@
 #pragma once
 /// \file joint.hpp
 /// Kernels of joints between bodies (see Joint): what they hold as equations in the poses of both, with exact
-/// derivatives, and the laws over these. docs/theory.md derives them.
+/// derivatives, and the laws over these. Numbers in brackets are of docs/theory.md, 12.
 
 #include "tendril/state/state.hpp"
 
@@ -40,6 +40,7 @@ struct JointRow {
 /// the whole rotation.
 inline constexpr int joint_rows = 8, coordinate_row = 6, cosine_row = 7;
 using Rows = Eigen::Matrix<double, joint_rows, 1>;
+/// Value and derivatives of a row: (12.1) and (12.2), of a point that is held (12.3).
 JointRow jointRow(const Joint &joint, const JointPlace &place, int row);
 /// Their values. A row that the joint has no use for is zero.
 Rows jointValues(const Joint &joint, const JointPlace &place);
@@ -58,7 +59,8 @@ struct JointLaw {
   double value = 0;
   Rows slope = Rows::Zero(), more = Rows::Zero();
   Eigen::Matrix<double, joint_rows, joint_rows> curvature = Eigen::Matrix<double, joint_rows, joint_rows>::Zero();
-  /// Adds springs in place of what is held, those of a drive and of a range, at given values of the rows.
+  /// Adds springs in place of what is held, (16.1) of the point and (12.5) of turns, those of a drive and of a range,
+  /// at given values of the rows.
   void addSprings(const Joint &joint, const Rows &values, double target);
   /// Gradient over the poses by a part of the slope. \param rows of the joint
   Vec12 gradient(const std::array<JointRow, joint_rows> &rows, const Rows &by) const {

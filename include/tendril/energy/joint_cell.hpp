@@ -17,8 +17,8 @@ struct JointCellDerivatives {
 };
 
 /// Frame as an edge of unit length: by its spin its tangent t moves by spin x t + spin x (spin x t)/2, and it twists by
-/// t.spin, up to third order. With T these first derivatives, g those of the energy by the vector of that edge and H
-/// its Hessian the Hessian by the spin is T'HT + (g t' + t g')/2 - (g.t) 1.
+/// t.spin, up to third order (docs/theory.md (8.1)). With T these first derivatives, g those of the energy by the
+/// vector of that edge and H its Hessian the Hessian by the spin is T'HT + (g t' + t g')/2 - (g.t) 1, (8.2).
 ///
 /// \param cell the frame has no weight in its length
 ///

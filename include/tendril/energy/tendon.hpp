@@ -1,7 +1,7 @@
 #pragma once
 /// \file tendon.hpp
 /// Kernels of tendons (see Tendon): their displacement with exact derivatives, and what actuators do with it.
-/// docs/theory.md derives them.
+/// Numbers in brackets are of docs/theory.md, 10.
 
 #include "tendril/energy/carrier.hpp"
 
@@ -18,9 +18,9 @@ struct TendonDamper {
   double rate = 0; ///< one over time [1/s], 0 where none acts
   double rest = 0; ///< [m]
 };
-/// Tension is nowhere negative, unless the actuator may push; where there is none, the potential is zero. A muscle of
-/// length L with the pressure p beyond its least one, b the length of a thread of its braid and n its turns, has the
-/// tension p b^2/(4 pi n^2) (3 L^2/b^2 - 1) (Chou and Hannaford 1996, eq. 8).
+/// Tension is nowhere negative, unless the actuator may push; where there is none, the potential is zero. A spring is
+/// (10.6). A muscle of length L with the pressure p beyond its least one, b the length of a thread of its braid and n
+/// its turns, has the tension p b^2/(4 pi n^2) (3 L^2/b^2 - 1), (10.7) (Chou and Hannaford 1996, eq. 8).
 /// \param input target [m], tension [N] or pressure [Pa]
 /// \param taut that of a displacement is a spring both ways: as it is where Newton's method looks for its tension
 Pull pullOf(const Actuator &actuator, double displacement, double input, const TendonDamper &damper = {},
@@ -65,7 +65,7 @@ public:
   double length(const Configuration &c) const;
   /// Zero as drawn [m]; infinite where points that follow each other are one, or lie in what it winds round.
   double displacement(const Configuration &c) const { return length(c) - drawn_ + coordinates(c); }
-  /// Of the displacement; with tensions, of the work that they do.
+  /// Of the displacement, by (10.1) to (10.4); with tensions, of the work that they do.
   Derivatives derivatives(const Configuration &c, bool second, const TensionsAlong *along = nullptr) const;
   /// Places of its points [m], and with those between them where it winds round something.
   std::vector<Vec3> points(const Configuration &c) const;

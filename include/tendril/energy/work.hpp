@@ -20,8 +20,9 @@ struct Work {
   }
 };
 
-/// Work of a couple fixed in space and a torque about the tangent along the shortest way between two tangents, with a
-/// spin on the way [J]. Exact where the edge turns about one axis; else off by the third power of the turning.
+/// Work, docs/theory.md (28.2), of a couple fixed in space and a torque about the tangent along the shortest way
+/// between two tangents, with a spin on the way [J]. Exact where the edge turns about one axis; else off by the third
+/// power of the turning.
 double coupleWork(const Vec3 &moment, double torque, const Vec3 &from, const Vec3 &to, double spin);
 
 /// Work of forces, couples and tensions that are given between two configurations of one step, the load factor going

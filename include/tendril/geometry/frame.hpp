@@ -1,6 +1,7 @@
 #pragma once
 /// \file frame.hpp
-/// The orthonormal frame of an edge, its transport by minimal rotation, and the angle between two frames.
+/// The orthonormal frame of an edge, its transport by minimal rotation, and the angle between two frames. Numbers in
+/// brackets are of docs/theory.md.
 
 #include "tendril/geometry/scalar.hpp"
 
@@ -16,8 +17,8 @@ template <class T> struct FrameOf {
 };
 using Frame = FrameOf<double>;
 
-/// Carries `v`, a vector normal to the unit vector `from`, by the minimal rotation that takes `from` to the unit vector
-/// `to`. Singular when the two are opposite (the division gives inf or nan).
+/// Carries `v`, a vector normal to the unit vector `from`, by the minimal rotation (1.1) that takes `from` to the unit
+/// vector `to`. Singular when the two are opposite (the division gives inf or nan).
 template <class T> Vector3<T> transport(const Vector3<T> &v, const Vector3<T> &from, const Vector3<T> &to) {
   const T s = v.dot(to) / (T(1.0) + from.dot(to));
   return v - (from + to) * s;
@@ -30,13 +31,13 @@ template <class T> Matrix3<T> crossMatrix(const Vector3<T> &v) {
   return m;
 }
 
-/// Rotates `v`, normal to the unit vector `axis`, by `angle` [rad] about it.
+/// Rotates `v`, normal to the unit vector `axis`, by `angle` [rad] about it, as in (1.3).
 template <class T> Vector3<T> rotateAbout(const Vector3<T> &v, const Vector3<T> &axis, const T &angle) {
   return v * cosine(angle) + axis.cross(v) * sine(angle);
 }
 
-/// Angle from one frame to another about the second's tangent after minimal rotation, given by the cosine and sine of
-/// its half. Well conditioned for every angle in (-pi, pi).
+/// Angle (1.2) from one frame to another about the second's tangent after minimal rotation, given by the cosine and
+/// sine of its half. Well conditioned for every angle in (-pi, pi).
 template <class T> struct HalfAngle {
   T cosine, sine;
   T angle() const { return T(2.0) * arcTangent2(sine, cosine); }

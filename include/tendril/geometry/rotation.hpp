@@ -13,13 +13,13 @@ inline Mat3 matrixOf(const Frame &f) {
   return m;
 }
 
-/// Rotation by a vector: axis times angle.
+/// Rotation by a vector, axis times angle: Exp of docs/theory.md.
 inline Mat3 rotationBy(const Vec3 &turn) {
   const double angle = turn.norm();
   return angle > 0 ? Mat3(Eigen::AngleAxisd(angle, turn / angle)) : Mat3(Mat3::Identity());
 }
 
-/// Rotation vector, of length up to pi, that turns one frame into the other, in space.
+/// Rotation vector, of length up to pi, that turns one frame into the other, in space: g of docs/theory.md, 16.
 inline Vec3 rotationBetween(const Frame &from, const Frame &to) {
   const Eigen::Quaterniond q(Mat3(matrixOf(to) * matrixOf(from).transpose()));
   const double sine = q.vec().norm();

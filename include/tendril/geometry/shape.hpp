@@ -8,7 +8,8 @@
 
 namespace tendril {
 
-/// Signed distance [m], negative inside, with its gradient (of length one) and second derivatives. Where the nearest
+/// Signed distance [m], negative inside, with its gradient (of length one) and second derivatives, which contact takes
+/// by docs/theory.md (17.4) and solids have by (17.11). Where the nearest
 /// place of the surface is not the only one, those of one of them.
 struct Distance {
   double value;

@@ -2,7 +2,7 @@
 /// \file solids.hpp
 /// Distances of points from solids, written once for double, packs and automatic differentiation. Those of boxes and of
 /// what turns about an axis are one formula: with q the distances from pairs of faces, negative between them,
-/// |max(q, 0)| + min(max q, 0).
+/// |max(q, 0)| + min(max q, 0), docs/theory.md (17.10).
 
 #include "tendril/geometry/shape.hpp"
 

@@ -1,6 +1,6 @@
 #pragma once
 /// \file wrap.hpp
-/// Shortest ways between two points round a cylinder or a sphere.
+/// Shortest ways between two points round a cylinder or a sphere. Numbers in brackets are of docs/theory.md, 10.
 
 #include "tendril/geometry/frame.hpp"
 
@@ -15,15 +15,17 @@ struct WayLength {
   double turning = 0; ///< of its direction over that arc [rad]: less round a cylinder that it climbs along
 };
 
-/// Of the straight way; infinite where both ends are one.
+/// Of the straight way, (10.1); infinite where both ends are one.
 WayLength straightWay(const Vec3 &way);
 
-/// Round a cylinder about the z axis, whose surface can be developed: h in the plane of its circle, sqrt(h^2 + dz^2).
-/// The derivative of h by an end is the unit vector from where it meets the circle, and of second order the end moves
-/// as on a straight way to there. \param side 0: the nearer one, where the straight way meets it; 1 anticlockwise, -1
-/// clockwise from the first to the second, up to three quarters of a turn. \return infinite where an end is within
+/// Round a cylinder about the z axis, whose surface can be developed: h in the plane of its circle, sqrt(h^2 + dz^2)
+/// (10.2). The derivative of h by an end is the unit vector from where it meets the circle, and of second order the end
+/// moves as on a straight way to there (10.3). \param side 0: the nearer one, where the straight way meets it; 1
+/// anticlockwise, -1 clockwise from the first to the second, up to three quarters of a turn. \return infinite where an
+/// end is within
 WayLength wayRoundCylinder(const Vec3 &from, const Vec3 &to, double radius, int side);
-/// Round a sphere at the origin, in the plane through both ends, on the nearer side where the straight way meets it.
+/// Round a sphere at the origin (10.4), in the plane through both ends, on the nearer side where the straight way meets
+/// it.
 WayLength wayRoundSphere(const Vec3 &from, const Vec3 &to, double radius);
 
 /// So many points on it, for pictures, from where it meets the obstacle to where it leaves it; none of a straight way.

@@ -87,6 +87,12 @@ public:
   /// First of those of each tendon (Tendon::slots), in the order of the scene.
   const std::vector<int> &tendonSlots() const { return tendon_slot_; }
   Planes makePlanes() const { return Planes(slot_size, slots_); }
+  /// A window of them, over some rods.
+  Planes makePlanes(RodSet rods) const {
+    Planes window(slot_size, slots(rods));
+    window.setOrigin(rods_[rods.begin].first_slot);
+    return window;
+  }
 
   DM dm() const { return dm_; }
   /// Entries of the matrix of some rods in its own order: where their values are in the blocks, those to be taken off
@@ -148,7 +154,7 @@ private:
   ByRod<Tie> ties_;
   ByRod<JoinedBody> bodies_;
   ByRod<BodyPair> pairs_;
-  std::vector<Vec3> arms_;        ///< of joined vertices
+  std::vector<Vec3> arms_; ///< of joined vertices
   std::vector<int> tendon_slot_;
   int groups_ = 0;
   ByRod<TouchingPair> touching_;

@@ -36,7 +36,7 @@ struct Body {
   std::string shape = "none"; ///< box, sphere, capsule, cylinder, mesh or none
   Vec3 size = Vec3::Zero();   ///< of a box its edges; else radius, length along z
   std::shared_ptr<const TriangleMesh> mesh;
-  double cell = 0; ///< of the grid of its distances, 0: a 64th of its longest side [m]
+  double cell = 0;                    ///< of the grid of its distances, 0: a 64th of its longest side [m]
   std::shared_ptr<const Shape> solid; ///< of that shape in its own axes, where rods or bodies touch it; else null
   /// With obstacles, rods and other bodies: `on`, a barrier of `distance` and a force of `stiffness` at each sample of
   /// its surface [N] (0: by the loads), friction and damping.

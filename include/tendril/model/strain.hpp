@@ -2,7 +2,7 @@
 /// \file strain.hpp
 /// Strains of a rod: axial strain of an edge, bending and twist of a cell, which are the two edge frames that meet at a
 /// vertex, or an edge and the fixed frame of a clamp (the half cell). Discrete curvature binormal after Bergou et al.,
-/// "Discrete Elastic Rods" (2008), section 4.2.
+/// "Discrete Elastic Rods" (2008), section 4.2. Numbers in brackets are of docs/theory.md.
 
 #include "tendril/geometry/frame.hpp"
 
@@ -18,8 +18,8 @@ enum class Measure { tan, angle };
 /// strains: axialStrain.
 enum class Energy { seed, classical };
 
-/// Axial strain of an edge: ((l/L)^2 - 1)/2 (`seed`; St. Venant-Kirchhoff in the Green-Lagrange strain) or l/L - 1
-/// (`classical`; Hooke), written so that small strains keep their digits. The stretch energy is 1/2 k strain^2 L.
+/// Axial strain (2.1) of an edge: ((l/L)^2 - 1)/2 (`seed`; St. Venant-Kirchhoff in the Green-Lagrange strain) or l/L -
+/// 1 (`classical`; Hooke), written so that small strains keep their digits. The stretch energy is 1/2 k strain^2 L.
 template <class T> T axialStrain(Energy energy, const T &length, const T &inverse_rest_length) {
   if (energy == Energy::classical) return length * inverse_rest_length - T(1.0);
   return (length * inverse_rest_length - T(1.0)) * (length * inverse_rest_length + T(1.0)) * T(0.5);
@@ -42,7 +42,7 @@ template <class T> struct CellOf {
 };
 
 /// phi(z) = atan(sqrt z)/sqrt z and two derivatives, z = tan^2 of half the turning angle: the factor between the two
-/// measures of bending.
+/// measures of bending, (3.4).
 template <class T> struct AngleFactor { T value, first, second; };
 template <class T> AngleFactor<T> angleFactor(const T &z) {
   using std::sqrt;
@@ -63,7 +63,7 @@ template <class T> AngleFactor<T> angleFactor(const T &z) {
   return {select(small, v, value), select(small, d, first), select(small, dd, second)};
 }
 
-/// Geometry shared by the strain and its derivatives.
+/// Geometry shared by the strain and its derivatives: (3.1), (3.3).
 template <class T> struct CellGeometry {
   T chi;               ///< 1 + t0.t1
   Vector3<T> binormal; ///< curvature binormal 2 t0 x t1 / chi
@@ -100,8 +100,8 @@ template <Measure measure, class T> std::array<T, 3> twistMeasure(const HalfAngl
   }
 }
 
-/// Strains of a cell integrated over it (bending about d1 and d2, twist) [rad], before the rest strains are taken off.
-/// kappa_alpha Lbar = stretch kbar.d_alpha, tau Lbar = 2 tan(angle/2).
+/// Strains (3.2) of a cell integrated over it (bending about d1 and d2, twist) [rad], before the rest strains are taken
+/// off. kappa_alpha Lbar = stretch kbar.d_alpha, tau Lbar = 2 tan(angle/2).
 template <Measure measure, class T>
 std::array<T, 3> cellStrain(const FrameOf<T> &f0, const FrameOf<T> &f1, const CellOf<T> &cell) {
   const CellGeometry<T> g = cellGeometry(f0, f1, cell);

@@ -11,6 +11,8 @@
 #include "tendril/solver/pivots.hpp"
 #include "tendril/solver/schur.hpp"
 
+#include <map>
+
 namespace tendril {
 
 class CondensedFactor {
@@ -68,7 +70,19 @@ private:
   bool regular_ = true;
   int negative_ = 0, zero_ = 0;
 
+  /// Of separators' unknowns, the first of those that a slot has: of junctions, and of edges that run through.
+  struct Numbers {
+    std::map<int, int> junction, edge;
+  };
+  std::map<int, int> numberJunctions();
+  std::map<int, int> numberEdgesThrough();
+  Places placesOf(const JoinedVertex &j, const JoinedEdge *edge, const Numbers &numbers) const;
+  Run makeRun(int rod, int begin, int end, const JoinedVertex *near, const JoinedVertex *far,
+              const Numbers &numbers) const;
   void cut();
+  void addGroup(const int *run, int count, bool packed, std::size_t &records, std::size_t &values,
+                std::vector<int> &rows, std::vector<int> &columns);
+  void addOwnEntries(std::vector<int> &rows, std::vector<int> &columns) const;
   void group(std::vector<int> &rows, std::vector<int> &columns);
   template <class T> void factorGroup(const Group &group, const BandedSystem &system);
   template <class T> using Block = T[state_size][state_size];

@@ -205,9 +205,10 @@ public:
   void setAxialForces(int rod, const double *force);
 
   /// Moves to where the unknowns are `x` (displacements and spins since the step began) by the additive retraction.
+  /// \param trial room for configurations of these rods
   /// \param supports whether supports that move go to the end of their motion, too
   /// \return whether the configuration there is possible; where it is not, some rods may have moved
-  [[nodiscard]] bool moveTo(const Planes &x, RodSet rods, bool supports = false);
+  [[nodiscard]] bool moveTo(const Planes &x, RodSet rods, Configuration &trial, bool supports);
   /// Displacements and spins of the iterate since the step began.
   void coordinates(Planes &x, RodSet rods) const;
   void coordinates(Planes &x) const { coordinates(x, all()); }

@@ -258,6 +258,7 @@ private:
   void weigh(const Planes &motion, Planes &weighed) const;
   double normaliseMode();
   double turningOf(int rod) const;
+  class ModeSearch;
   PetscErrorCode findBucklingModes(std::vector<char> *found, std::vector<char> *neutral);
   PetscErrorCode escapeSaddle(bool *left, bool *neutral);
   void predict();

@@ -8,9 +8,9 @@
 namespace tendril {
 
 /// `additive` adds the increments to the positions. `length` gives every edge its linearised new length t.(e + de)
-/// along its new direction, so that turning an edge does not stretch it: the stretching energy no longer limits the
-/// step (docs/theory.md, Retraction). `continued` lengthens edges as the last step did, where the increments are that
-/// step's: (l^2 - |e - de|^2)/2l, which is not t.de. `kept` turns edges without lengthening them.
+/// along its new direction, docs/theory.md (21.1), so that turning an edge does not stretch it: the stretching energy
+/// no longer limits the step. `continued` lengthens edges as the last step did, where the increments are that step's:
+/// (l^2 - |e - de|^2)/2l, which is not t.de (21.2). `kept` turns edges without lengthening them.
 enum class RetractionKind { additive, length, continued, kept };
 
 class Retraction {
@@ -41,7 +41,9 @@ private:
   void lay(int begin, int end, Configuration &to) const;
   void layFree(const Configuration &from, const RodRange &rod, int anchor, bool pinned, Configuration &to) const;
   bool restoreLengths(const Configuration &from, int rod, RetractionKind kind, Configuration &to);
+  Pack measureSpan(const RodRange &rod, int first, int last, Configuration &to);
   void projectSpan(const RodRange &rod, int first, int last, Configuration &to);
+  bool turnEdges(const Configuration &from, const Planes &increment, double scale, int rod, Configuration &to) const;
   bool updateFrames(const Configuration &from, const Planes &increment, double scale, int rod, Configuration &to) const;
 };
 

@@ -26,7 +26,7 @@ template <class T> Matrix3<T> exponential(const Vector3<T> &f) {
 }
 
 /// Second derivative by a spin of the energy of a force: that of g.(exp(d) arm) at d = 0, which no first derivative
-/// has.
+/// has; docs/theory.md (9.1).
 inline Mat3 curvatureOfArm(const Vec3 &g, const Vec3 &arm) {
   return 0.5 * (g * arm.transpose() + arm * g.transpose()) - g.dot(arm) * Mat3::Identity();
 }
@@ -49,10 +49,11 @@ inline Mat3 tangentMap(const Vec3 &f) {
 }
 
 /// With f the rotation vector since the start of the step, R = exp(f) R_n, and a stage rule: the spin is omega = f/dt +
-/// past_spin, the momentum pi = I(R) omega, its rate (mass pi + past_momentum)/dt. With `keeps_energy`, in the middle
-/// of a step: omega = tan|f|/|f| f/dt, the momentum at the end R' (2 I R_n' omega - Pi_n) with R' = exp(2 f) R_n, and
-/// pi the mean of that and the momentum at the start (J. C. Simo, K. K. Wong, *Unconditionally stable algorithms for
-/// rigid body dynamics that exactly preserve energy and momentum*, Int. J. Num. Meth. Eng. 31, 1991).
+/// past_spin, the momentum pi = I(R) omega, its rate (mass pi + past_momentum)/dt: docs/theory.md (9.2). With
+/// `keeps_energy`, in the middle of a step (9.3): omega = tan|f|/|f| f/dt, the momentum at the end R' (2 I R_n' omega -
+/// Pi_n) with R' = exp(2 f) R_n, and pi the mean of that and the momentum at the start (J. C. Simo, K. K. Wong,
+/// *Unconditionally stable algorithms for rigid body dynamics that exactly preserve energy and momentum*, Int. J. Num.
+/// Meth. Eng. 31, 1991).
 struct SpinStage {
   Mat3 inertia; ///< as drawn [kg m^2]
   Mat3 start;   ///< rotation at the start of the step since it was drawn

@@ -81,7 +81,7 @@ private:
   }
 };
 
-/// With d the displacements and spins since the start of the step:
+/// With d the displacements and spins since the start of the step, docs/theory.md (15.1):
 ///   velocity v = d/dt + `velocity`,   acceleration = (mass v + `acceleration`)/dt,   strain rate = (strain - its value
 ///   at the start)/damping_dt,
 /// where the start's strain s gets weight (s - strains) on top for each of `damping_past`.
@@ -111,7 +111,8 @@ struct StageRule {
 /// Frames of a rod from which a stage measures twist: those of the start, carried to where the guess leads. Twist
 /// inertia then acts on positions by the small turn from there; from the start itself, that would be an error of first
 /// order in the step. Between a curve on the sphere of tangents and its chord lies 4/3 of the triangle with the curve's
-/// middle, but for terms of fifth order in the step; by that angle frames turn on top where `halfway` is known.
+/// middle, but for terms of fifth order in the step, docs/theory.md (15.11); by that angle frames turn on top where
+/// `halfway` is known.
 void carryFrames(const StageRule &rule, const Elements &elements, int rod, const Configuration &from,
                  Configuration &reference);
 

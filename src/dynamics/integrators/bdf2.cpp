@@ -1,5 +1,5 @@
-/// Backward differentiation of second order with steps h after h/w, L-stable. With r = (1 + 2w)/(1 + w) and c = w^2/(1
-/// + w),
+/// Backward differentiation of second order with steps h after h/w, L-stable, docs/theory.md (15.3). With r =
+/// (1 + 2w)/(1 + w) and c = w^2/(1 + w),
 ///   v = (r d - c d_last)/h,   a = (r (v - v_n) - c (v_n - v_last))/h
 /// A state without memory is left by a step of sdirk2.
 #include "tendril/dynamics/integrator.hpp"
@@ -31,7 +31,7 @@ public:
     return rule;
   }
 
-  /// h^2 (h + h/w)/(6 r) x''', by the second difference of the velocities.
+  /// h^2 (h + h/w)/(6 r) x''' (15.14), by the second difference of the velocities.
   Combination error(const State &start, double h, const Stages &done) const override {
     if (start.memory.empty()) return first_->error(start, h, done);
     const double w = h / start.last_dt, r = (1 + 2 * w) / (1 + w), third = h * h / (3 * r);

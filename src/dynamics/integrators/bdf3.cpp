@@ -1,6 +1,7 @@
 /// Backward differentiation of third order, after steps h_1 and h_2: v is the slope, at the end of the step, of the
 /// cubic through four positions, and a is that of four velocities. With H1 = h + h_1, H2 = H1 + h_2, r = 1 + h/H1 +
-/// h/H2, p = h H1/(H2 (h_1 + h_2)), q = h/H1 + h/H2 + p and the chords d_1/h_1 and d_2/h_2,
+/// h/H2, p = h H1/(H2 (h_1 + h_2)), q = h/H1 + h/H2 + p and the chords d_1/h_1 and d_2/h_2, docs/theory.md (15.3),
+/// (15.4),
 ///   v = (r d/h - q d_1/h_1 + p d_2/h_2),   a = r (v - v_n)/h - q (v_n - v_1)/h_1 + p (v_1 - v_2)/h_2
 /// Stable for what decays within 86 degrees of the negative axis; undamped motion at omega h < 1.94 grows, by (omega
 /// h)^4/4 in a step where that is small. Two steps of sdirk33 come first.
@@ -49,7 +50,7 @@ public:
     return rule;
   }
 
-  /// h^2 H1 H2/(24 r) x'''', by the third difference of the velocities.
+  /// h^2 H1 H2/(24 r) x'''' (15.14), by the third difference of the velocities.
   Combination error(const State &start, double h, const Stages &done) const override {
     if (begins(start)) return first_->error(start, h, done);
     const Weights w(start, h);

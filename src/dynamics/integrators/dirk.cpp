@@ -1,7 +1,8 @@
-/// Diagonally implicit Runge-Kutta methods. With the table A, b and c = A 1, stage k at t_n + c_k h has
+/// Diagonally implicit Runge-Kutta methods, docs/theory.md (15.3), (15.5). With the table A, b and c = A 1, stage k at
+/// t_n + c_k h has
 ///   v_k = (d_k - h sum_j<k a_kj v_j)/(a_kk h),   a_k = (v_k - v_n - h sum_j<k a_kj a_j)/(a_kk h)
-/// and the step moves by h sum b_k v_k: to its last stage where the last row of A is b ("stiffly accurate"), else
-/// beyond.
+/// and the step moves by h sum b_k v_k (15.6): to its last stage where the last row of A is b ("stiffly accurate"),
+/// else beyond.
 #include "tendril/dynamics/integrator.hpp"
 
 #include <Eigen/LU>
@@ -74,8 +75,8 @@ public:
     return end;
   }
 
-  /// (b A^p 1 - 1/(p + 1)!) h^(p + 1) x^(p + 1), as of a linear motion, by the velocities of the start and the stages;
-  /// where those are too few, by the accelerations of the stages and of the last stage of the step before.
+  /// (b A^p 1 - 1/(p + 1)!) h^(p + 1) x^(p + 1) (15.14), as of a linear motion, by the velocities of the start and the
+  /// stages; where those are too few, by the accelerations of the stages and of the last stage of the step before.
   Combination error(const State &start, double h, const Stages &done) const override {
     Combination error;
     if (stages_ >= order_) {

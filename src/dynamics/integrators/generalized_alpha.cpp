@@ -1,5 +1,5 @@
-/// Generalized-alpha (Chung and Hulbert 1993) with forces in balance at the ends of steps (Arnold and Bruels 2007).
-/// Accelerations a of the motion and A of the method:
+/// Generalized-alpha (Chung and Hulbert 1993) with forces in balance at the ends of steps (Arnold and Bruels 2007),
+/// docs/theory.md (15.7) to (15.10), where b and c here are B and G. Accelerations a of the motion and A of the method:
 ///   (1 - am) A_n+1 + am A_n = (1 - af) a_n+1 + af a_n
 ///   d = h v_n + h^2 ((1/2 - b) A_n + b A_n+1),   v_n+1 = v_n + h ((1 - c) A_n + c A_n+1)
 /// am = (2 rho - 1)/(rho + 1), af = rho/(rho + 1), c = 1/2 - am + af, b = (1 - am + af)^2/4. A lags behind a by (af -
@@ -47,8 +47,8 @@ public:
     return rule;
   }
 
-  /// From the leading error of its frequencies, (b - 1/12 - (af - am) af) h^2 x'' x''/2: a half of that h^3 x''' in a
-  /// step.
+  /// (15.14), from the leading error of its frequencies, (b - 1/12 - (af - am) af) h^2 x'' x''/2: a half of that h^3
+  /// x''' in a step.
   Combination error(const State &start, double h, const Stages &done) const override {
     const double third = 0.5 * (b_ - 1.0 / 12 + (am_ - af_) * af_) * h * h;
     return Combination().add(third, done[0].acceleration).add(-third, start.memory[motion]);

@@ -3,6 +3,7 @@
 #include "tendril/model/scene.hpp"
 
 #include <map>
+#include <optional>
 
 namespace tendril {
 namespace {
@@ -28,46 +29,33 @@ constexpr Entry entries[] = {
 
 } // namespace
 
-/// (F - dU/dq)/m - alpha v where nothing is held. Strains have the rates that velocities give them.
-Rates startAcceleration(StepSolver &solver, double h, const State &state) {
+/// Strains a moment before the start, by the velocities there; nothing where that is impossible.
+static std::optional<std::vector<double>> strainsBefore(StepSolver &solver, double moment, const State &state) {
   IncrementalPotential &potential = solver.potential();
   const Elements &elements = potential.elements();
-  StageRule rest; // at the start: neither velocities nor accelerations
-  rest.dt = rest.damping_dt = h;
-  Step step;
-  step.dt = h;
-  step.time = state.time;
-  step.rule = &rest;
-  solver.begin(state, step);
-  std::vector<double> before;
-  if (potential.scene().strainsDissipate()) {
-    const double moment = 1e-3 * h; // long enough for the strains to change by more than their rounding
-    Planes back = potential.dofs().makePlanes();
-    for (const RodRange &rod : elements.rods) {
-      for (int i = 0; i < rod.vertices; ++i)
-        back.setVector(0, rod.slot(i),
-                       -moment * elements.freedom()[rod.slot(i)] * state.velocity[rod.first_vertex + i]);
-      for (int i = 0; rod.twist && i < rod.edges; ++i)
-        back[3][rod.slot(i)] = -moment * state.twist_rate[rod.first_edge + i];
-      potential.dofs().copyBehindRing(rod, back);
-    }
-    potential.setBodies(potential.all(), back,
-                        [&](const JoinedBody &b) { return BodyRate().add(-moment, state.body_rate[b.body]); });
-    potential.turnFrames(potential.all(), back);
-    Configuration earlier;
-    bool possible = true;
-    for (int r = 0; r < potential.all().end; ++r)
-      possible = potential.tryMove(back, 1, r, RetractionKind::additive, earlier) && possible;
-    if (solver.team().all(possible)) {
-      setTargets(potential.scene(), elements, state.time - moment, earlier);
-      before = strainsOf(potential.scene(), elements, earlier);
-      rest.damping_dt = moment;
-      rest.damping_past = {{-1, before.data()}};
-      solver.begin(state, step);
-    }
+  Planes back = potential.dofs().makePlanes();
+  for (const RodRange &rod : elements.rods) {
+    for (int i = 0; i < rod.vertices; ++i)
+      back.setVector(0, rod.slot(i), -moment * elements.freedom()[rod.slot(i)] * state.velocity[rod.first_vertex + i]);
+    for (int i = 0; rod.twist && i < rod.edges; ++i)
+      back[3][rod.slot(i)] = -moment * state.twist_rate[rod.first_edge + i];
+    potential.dofs().copyBehindRing(rod, back);
   }
-  Rates a{std::vector<Vec3>(state.velocity.size(), Vec3::Zero()), std::vector<double>(state.twist_rate.size(), 0.0),
-          std::vector<BodyRate>(state.body_rate.size())};
+  potential.setBodies(potential.all(), back,
+                      [&](const JoinedBody &b) { return BodyRate().add(-moment, state.body_rate[b.body]); });
+  potential.turnFrames(potential.all(), back);
+  Configuration earlier;
+  bool possible = true;
+  for (int r = 0; r < potential.all().end; ++r)
+    possible = potential.tryMove(back, 1, r, RetractionKind::additive, earlier) && possible;
+  if (!solver.team().all(possible)) return std::nullopt;
+  setTargets(potential.scene(), elements, state.time - moment, earlier);
+  return strainsOf(potential.scene(), elements, earlier);
+}
+
+/// Of vertices and edges by the forces on each alone.
+static void accelerateRods(IncrementalPotential &potential, const State &state, Rates *a) {
+  const Elements &elements = potential.elements();
   for (int r = 0; r < int(elements.rods.size()); ++r) {
     const RodRange &rod = elements.rods[r];
     const Planes &force = potential.gradient(r).equilibrium;
@@ -75,15 +63,20 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
     for (int i = 0; i < rod.vertices; ++i) {
       const int s = rod.slot(i), v = rod.first_vertex + i;
       if (elements.freedom()[s] != 0 && elements.mass()[s] > 0)
-        a.vertex[v] = -force.vector(0, s) / elements.mass()[s] - damping * state.velocity[v];
-      if (rod.flat >= 0) a.vertex[v][rod.flat] = 0; // rounding, which would grow
+        a->vertex[v] = -force.vector(0, s) / elements.mass()[s] - damping * state.velocity[v];
+      if (rod.flat >= 0) a->vertex[v][rod.flat] = 0; // rounding, which would grow
     }
     for (int i = 0; rod.twist && i < rod.edges; ++i) {
       const int s = rod.slot(i), e = rod.first_edge + i;
       if (elements.twistMass()[s] > 0)
-        a.edge[e] = -force[3][s] / elements.twistMass()[s] - damping * state.twist_rate[e];
+        a->edge[e] = -force[3][s] / elements.twistMass()[s] - damping * state.twist_rate[e];
     }
   }
+}
+
+/// Of vertices in junctions, by the forces on all of them.
+static void accelerateJunctions(IncrementalPotential &potential, const State &state, Rates *a) {
+  const Elements &elements = potential.elements();
   std::map<int, double> mass; // of junctions, by the slots of their first members, which have all forces
   const auto joined = elements.joinedVertices(potential.all());
   for (const JoinedVertex &j : joined)
@@ -93,27 +86,59 @@ Rates startAcceleration(StepSolver &solver, double h, const State &state) {
                  damping = potential.scene().rods[j.rod].material.mass_damping_coefficient;
     const int v = elements.rods[j.rod].first_vertex + j.vertex;
     if (whole > 0)
-      a.vertex[v] =
+      a->vertex[v] =
           -potential.gradient(j.rod).equilibrium.vector(0, j.first_slot) / whole - damping * state.velocity[v];
   }
+}
+
+/// Of bodies, and of the vertices that are tied to them.
+static void accelerateBodies(IncrementalPotential &potential, const State &state, Rates *a) {
+  const Elements &elements = potential.elements();
   for (const JoinedBody &b : elements.bodies(potential.all())) {
     const Planes &force = potential.gradient(b.rod).equilibrium;
     const MassProperties &all = elements.bodyMass(b.body);
     const Mat3 turned = rotationOf(state, b.group);
     const BodyRate &rate = state.body_rate[b.body];
-    BodyRate &of_body = a.body[b.body];
+    BodyRate &of_body = a->body[b.body];
     of_body.translation = -force.vector(0, b.position) / all.mass;
     of_body.momentum = -force.vector(0, b.rotation);
     of_body.spin =
         turned * elements.spinOf(b.body, turned.transpose() * (of_body.momentum - rate.spin.cross(rate.momentum)));
   }
-  for (const JoinedVertex &j : joined) {
+  for (const JoinedVertex &j : elements.joinedVertices(potential.all())) {
     if (!j.isOnBody() || !j.isVertex()) continue;
     const int body = j.body;
     const Vec3 arm = potential.dofs().arm(j), &spin = state.body_rate[body].spin;
-    a.vertex[elements.rods[j.rod].first_vertex + j.vertex] =
-        a.body[body].translation + a.body[body].spin.cross(arm) + spin.cross(spin.cross(arm));
+    a->vertex[elements.rods[j.rod].first_vertex + j.vertex] =
+        a->body[body].translation + a->body[body].spin.cross(arm) + spin.cross(spin.cross(arm));
   }
+}
+
+/// (F - dU/dq)/m - alpha v where nothing is held. Strains have the rates that velocities give them.
+Rates startAcceleration(StepSolver &solver, double h, const State &state) {
+  IncrementalPotential &potential = solver.potential();
+  StageRule rest; // at the start: neither velocities nor accelerations
+  rest.dt = rest.damping_dt = h;
+  Step step;
+  step.dt = h;
+  step.time = state.time;
+  step.rule = &rest;
+  solver.begin(state, step);
+  std::optional<std::vector<double>> before;
+  if (potential.scene().strainsDissipate()) {
+    const double moment = 1e-3 * h; // long enough for the strains to change by more than their rounding
+    before = strainsBefore(solver, moment, state);
+    if (before) {
+      rest.damping_dt = moment;
+      rest.damping_past = {{-1, before->data()}};
+      solver.begin(state, step);
+    }
+  }
+  Rates a{std::vector<Vec3>(state.velocity.size(), Vec3::Zero()), std::vector<double>(state.twist_rate.size(), 0.0),
+          std::vector<BodyRate>(state.body_rate.size())};
+  accelerateRods(potential, state, &a);
+  accelerateJunctions(potential, state, &a);
+  accelerateBodies(potential, state, &a);
   return a;
 }
 

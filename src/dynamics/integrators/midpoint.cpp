@@ -1,11 +1,12 @@
-/// Implicit midpoint: v = d/(h/2), a = (v - v_n)/(h/2) in the middle of the step; its end lies as far beyond, v_n+1 = 2
-/// v - v_n. Keeps linear momentum and what is quadratic in the motion; the energy stays within a band. Nothing damps
-/// stiff motions. With the axial force of an edge from the mean S of its strains at both ends of the step instead of
-/// its strain in the middle, what it does over the step is what the edge stores: strains are quadratic in positions, so
-/// that their change is B(middle) times the displacement (Simo, Tarnow and Doblare 1995). But S B(middle) is no
-/// gradient: d S = (m + de)/L^2, while the force points along the middle's edge m. So a step solves first for the
-/// middle, then with |de|^2/(2 L^2), what the mean has on top of the strain in the middle, as the solve before found
-/// it, until one iteration of Newton's method is enough. Each is a potential with forces along m.
+/// Implicit midpoint, docs/theory.md (15.3): v = d/(h/2), a = (v - v_n)/(h/2) in the middle of the step; its end lies
+/// as far beyond, v_n+1 = 2 v - v_n. Keeps linear momentum and what is quadratic in the motion; the energy stays within
+/// a band. Nothing damps stiff motions. With the axial force of an edge from the mean S of its strains at both ends of
+/// the step instead of its strain in the middle, what it does over the step is what the edge stores: strains are
+/// quadratic in positions, so that their change is B(middle) times the displacement (15.12) (Simo, Tarnow and Doblare
+/// 1995). But S B(middle) is no gradient: d S = (m + de)/L^2, while the force points along the middle's edge m. So a
+/// step solves first for the middle, then with |de|^2/(2 L^2), what the mean has on top of the strain in the middle, as
+/// the solve before found it, until one iteration of Newton's method is enough. Each is a potential with forces along
+/// m.
 #include "tendril/dynamics/integrator.hpp"
 
 namespace tendril {
@@ -55,8 +56,8 @@ public:
     return end;
   }
 
-  /// h^3/12 x''', by the accelerations in the middles of this step and the last; of the first, in its middle and at its
-  /// start.
+  /// h^3/12 x''' (15.14), by the accelerations in the middles of this step and the last; of the first, in its middle
+  /// and at its start.
   Combination error(const State &start, double h, const Stages &done) const override {
     const double third = h * h * h / 12 / (0.5 * (h + start.last_dt));
     return Combination().add(third, done.back().acceleration).add(-third, start.memory[0]);
