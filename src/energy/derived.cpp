@@ -113,14 +113,10 @@ static std::map<int, Vec3> forcesThatDraw(const Scene &scene, const Elements &el
   return sum;
 }
 
-RodActions rodActions(const Scene &scene, const Elements &elements, const State &state, double motion_time,
-                      double load_factor, bool dynamic) {
-  const Configuration c = configurationOf(state, scene, elements, motion_time);
-  RodActions out;
+/// Forces in edges by their stretch.
+static void setStretchForces(const Scene &scene, const Elements &elements, const State &state, const Configuration &c,
+                             RodActions &out) {
   out.force.resize(state.director.size());
-  out.moment.assign(state.position.size(), Vec3::Zero());
-  out.reaction.assign(scene.supports.size(), Vec3::Zero());
-  out.reaction_moment = out.reaction;
   for (std::size_t r = 0; r < elements.rods.size(); ++r) {
     const RodRange &rod = elements.rods[r];
     for (int i = rod.first_edge; i < rod.first_edge + rod.edges; ++i) {
@@ -135,16 +131,22 @@ RodActions rodActions(const Scene &scene, const Elements &elements, const State 
           stretchGradient(f, axial, strainSlope(elements.energy[r], f.length, elements.inverseRestLength()[slot]));
     }
   }
-  for (std::size_t k = 0; k < scene.constraints.size(); ++k)
-    out.constraint.push_back(readConstraint(scene, elements, int(k), state, c, dynamic));
-  for (std::size_t k = 0; k < scene.joints.size(); ++k)
-    out.joint.push_back(readJoint(scene, elements, int(k), state, c, dynamic));
-  // A couple acts by a pair of forces on the ends of its edge, which is not a force in the rod.
+}
+
+/// A couple acts by a pair of forces on the ends of its edge, which is not a force in the rod.
+static void takeCouplesAway(const Scene &scene, const Elements &elements, const Configuration &c, double load_factor,
+                            RodActions &out) {
   for (const EdgeMoment &m : scene.moments) {
     const int i = elements.rods[m.rod].first_edge + m.edge;
     const Frame f = c.frameAt(elements.edge_slot[i]);
     out.force[i] -= load_factor / f.length * m.moment.cross(f.tangent);
   }
+  for (std::size_t r = 0; r < elements.rods.size(); ++r)
+    for (const EndCouple &end : elements.end_couples[r]) { // what its half edge pulls is one
+      const Frame f = c.frameAt(end.edge);
+      out.force[elements.rods[r].first_edge + end.edge - elements.rods[r].first_slot] +=
+          endPull(elements, f, end, load_factor).force * f.tangent;
+    }
   for (std::size_t k = 0; k < scene.constraints.size(); ++k) {
     const Constraint &constraint = scene.constraints[k];
     if (constraint.isPin()) continue;
@@ -152,6 +154,10 @@ RodActions rodActions(const Scene &scene, const Elements &elements, const State 
     const Frame f = c.frameAt(elements.edge_slot[i]);
     out.force[i] -= out.constraint[k].moment.cross(f.tangent) / f.length;
   }
+}
+
+/// Forces in edges and moments at vertices by bending and twist.
+static void addCellActions(const Elements &elements, const Configuration &c, RodActions &out) {
   eachCell(
       elements, c,
       [&](const std::array<Frame, 2> &f, const CellOf<double> &k, double, const CellPlace &place, Measure measure) {
@@ -162,6 +168,10 @@ RodActions rodActions(const Scene &scene, const Elements &elements, const State 
         if (place.kind != CellPlace::before) out.force[place.edge1] += by_edge1;
         if (place.kind != CellPlace::before || place.at_end) out.moment[place.vertex] += cellMoment(f[0], f[1], k, d);
       });
+}
+
+/// What rods do to the bodies that they are tied to.
+static void addAttachments(const Scene &scene, const Elements &elements, const Configuration &c, RodActions &out) {
   for (const Attachment &a : scene.attachments) {
     const Rod &rod = scene.rods[a.rod];
     const RodRange &range = elements.rods[a.rod];
@@ -173,6 +183,37 @@ RodActions rodActions(const Scene &scene, const Elements &elements, const State 
     out.attachment.push_back(force);
     out.attachment_moment.push_back(moment);
   }
+}
+
+/// Weight, forces of the scene and centrifugal force on a vertex.
+static Vec3 loadsOn(const Scene &scene, const Elements &elements, const State &state, const Configuration &c, int rod,
+                    int vertex) {
+  const int v = elements.rods[rod].first_vertex + vertex;
+  const double mass = elements.mass()[elements.vertex_slot[v]];
+  Vec3 loads = scene.rotation.matrix() * (state.position[v] - scene.rotation.centre) * mass;
+  if (scene.rods[rod].gravity) loads += mass * scene.gravity;
+  for (const int f : elements.forcesOf(rod))
+    if (scene.forces[f].vertex == vertex) loads += scene.forces[f].force;
+  for (const PlacedFollower &f : elements.followers({rod, rod + 1}))
+    if (f.vertex == elements.vertex_slot[v]) loads += f.along(c.frameAt(f.edge));
+  return loads;
+}
+
+RodActions rodActions(const Scene &scene, const Elements &elements, const State &state, double motion_time,
+                      double load_factor, bool dynamic) {
+  const Configuration c = configurationOf(state, scene, elements, motion_time);
+  RodActions out;
+  out.moment.assign(state.position.size(), Vec3::Zero());
+  out.reaction.assign(scene.supports.size(), Vec3::Zero());
+  out.reaction_moment = out.reaction;
+  setStretchForces(scene, elements, state, c, out);
+  for (std::size_t k = 0; k < scene.constraints.size(); ++k)
+    out.constraint.push_back(readConstraint(scene, elements, int(k), state, c, dynamic));
+  for (std::size_t k = 0; k < scene.joints.size(); ++k)
+    out.joint.push_back(readJoint(scene, elements, int(k), state, c, dynamic));
+  takeCouplesAway(scene, elements, c, load_factor, out);
+  addCellActions(elements, c, out);
+  addAttachments(scene, elements, c, out);
   const std::map<int, Vec3> drawing = forcesThatDraw(scene, elements, state, c, out.constraint, dynamic);
   for (std::size_t k = 0; k < scene.supports.size(); ++k) {
     const Support &support = scene.supports[k];
@@ -185,12 +226,7 @@ RodActions rodActions(const Scene &scene, const Elements &elements, const State 
       const RodRange &range = elements.rods[r];
       const int v = range.first_vertex + vertex, before = rod.edgeBefore(vertex), after = rod.edgeAfter(vertex);
       const double mass = elements.mass()[elements.vertex_slot[v]];
-      Vec3 loads = scene.rotation.matrix() * (state.position[v] - scene.rotation.centre) * mass;
-      if (rod.gravity) loads += mass * scene.gravity;
-      for (const int f : elements.forcesOf(r))
-        if (scene.forces[f].vertex == vertex) loads += scene.forces[f].force;
-      for (const PlacedFollower &f : elements.followers({r, r + 1}))
-        if (f.vertex == elements.vertex_slot[v]) loads += f.along(c.frameAt(f.edge));
+      const Vec3 loads = loadsOn(scene, elements, state, c, r, vertex);
       reaction += mass * rod.material.mass_damping_coefficient * state.velocity[v] - load_factor * loads;
       if (const auto drawn = drawing.find(elements.vertex_slot[v]); drawn != drawing.end()) reaction -= drawn->second;
       if (before >= 0) reaction += out.force[range.first_edge + before];

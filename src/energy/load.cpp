@@ -1,4 +1,5 @@
-/// Gravity, centrifugal and nodal forces, follower forces, and couples on edges.
+/// Gravity, centrifugal and nodal forces, follower forces, and couples on edges. Numbers in brackets are of
+/// docs/theory.md.
 #include "tendril/energy/load.hpp"
 
 #include "tendril/energy/work.hpp"
@@ -9,15 +10,16 @@
 namespace tendril {
 namespace {
 
-/// Dead forces have the potential -F.(x - x_start). A couple does the work M.t d(theta) + M.(t x dt) along the path of
-/// the iterates, a follower force F.dx; they have no potential over large rotations, so their work is measured from the
-/// last iterate: all that a line search compares starts there. The derivative of follower forces is `Circulatory`'s.
+/// Dead and centrifugal forces have the potentials (32.1). A couple does the work M.t d(theta) + M.(t x dt) along the
+/// path of the iterates (28.2), a follower force F.dx (32.2); they have no potential over large rotations, so their
+/// work is measured from the last iterate: all that a line search compares starts there. The derivative of follower
+/// forces is `Circulatory`'s (33.3).
 class Load final : public Term {
 public:
   Load(const Scene &scene, const Elements &elements)
       : scene_(scene), elements_(elements), turns_(!scene.rotation.angular_velocity.isZero(0)),
         centre_(scene.rotation.centre), spin_(scene.rotation.matrix()), full_(3, elements.slots),
-        couples_(scene.rods.size()), followers_(scene.rods.size()) {
+        couples_(scene.rods.size()), followers_(scene.rods.size()), ends_(scene.rods.size()) {
     for (std::size_t r = 0; r < scene.rods.size(); ++r)
       if (scene.rods[r].gravity)
         for (int s = elements.rods[r].first_slot; s < elements.rods[r].vertexEnd(); ++s)
@@ -30,6 +32,9 @@ public:
       couples_[m.rod].push_back({m, elements.rods[m.rod].slot(m.edge), Vec3::Zero(), 0.0});
     for (const PlacedFollower &f : elements.followers({0, int(scene.rods.size())}))
       followers_[f.rod].push_back({f, Vec3::Zero(), Vec3::Zero()});
+    for (std::size_t r = 0; r < scene.rods.size(); ++r)
+      for (const EndCouple &end : elements.end_couples[r])
+        if (end.stretches) ends_[r].push_back({end, {}});
     force_ = full_;
   }
 
@@ -51,6 +56,7 @@ public:
       f.iterate = iterate.displacementAt(f.vertex, *start_);
       f.acting = f.along(iterate.frameAt(f.edge));
     }
+    for (End &end : ends_[rod]) end.iterate = iterate.frameAt(end.edge);
   }
 
   void setLoadFactor(double factor) override {
@@ -81,6 +87,10 @@ public:
     for (const Follower &f : followers_[r])
       sum -=
           0.5 * factor_ * (f.acting + f.along(c.frameAt(f.edge))).dot(c.displacementAt(f.vertex, *start_) - f.iterate);
+    for (const End &end : ends_[r]) {
+      const Frame f = c.frameAt(end.edge);
+      sum += 0.5 * (pullOf(end, end.iterate).force + pullOf(end, f).force) * (f.length - end.iterate.length);
+    }
     return sum;
   }
 
@@ -129,6 +139,17 @@ public:
       }
       if (hessian != HessianKind::none) addCoupleHessian(factor_ * m.moment, f, m.slot, blocks);
     }
+    for (const End &end : ends_[r]) {
+      const Frame f = c.frameAt(end.edge);
+      const EndPull pull = pullOf(end, f);
+      for (int a = 0; a < 3; ++a) {
+        out.equilibrium[a][end.edge] -= pull.force * f.tangent[a];
+        out.equilibrium[a][end.edge + 1] += pull.force * f.tangent[a];
+        for (int b = a; b < 3 && hessian != HessianKind::none; ++b)
+          blocks.own(a, b)[end.edge] += (pull.by_length - pull.force / f.length) * f.tangent[a] * f.tangent[b] +
+                                        (a == b ? pull.force / f.length : 0);
+      }
+    }
   }
 
 private:
@@ -141,6 +162,9 @@ private:
     Vec3 iterate; ///< displacement of its vertex at the iterate, from the start
     Vec3 acting;  ///< there, at load factor 1 [N]
   };
+  struct End : EndCouple {
+    Frame iterate;
+  };
   const Scene &scene_;
   const Elements &elements_;
   bool turns_;
@@ -149,10 +173,13 @@ private:
   Planes full_, force_; ///< forces on vertices [N] at load factor 1, and now
   std::vector<std::vector<Couple>> couples_;
   std::vector<std::vector<Follower>> followers_;
+  std::vector<std::vector<End>> ends_; ///< end couples that pull
   const Configuration *start_ = nullptr;
   double factor_ = 1;
 
-  /// Centrifugal acceleration.
+  EndPull pullOf(const End &end, const Frame &f) const { return endPull(elements_, f, end, factor_); }
+
+  /// Centrifugal acceleration, by (32.1).
   Vector3<Pack> accelerationAt(const Vector3<Pack> &x) const {
     Vector3<Pack> a;
     for (int k = 0; k < 3; ++k)
@@ -161,8 +188,8 @@ private:
     return a;
   }
 
-  /// Symmetric part of the derivative of the gradient of a couple over (e, theta): with g_e = -(M x t)/l and g_theta =
-  /// -M.t, d g_e/d e = -[M]x (I - 2 t t')/l^2 ... symmetrised, d g_theta/d e = -(I - t t') M/l and d g_e/d theta = 0.
+  /// Symmetric part of the derivative of the gradient (32.3) of a couple over (e, theta): (16.5) with c = -M and H = 0,
+  /// as d g_theta/d e = -(I - t t') M/l and d g_e/d theta = 0. The rest is `Circulatory`'s (33.2).
   static void addCoupleHessian(const Vec3 &moment, const Frame &f, int slot, const BlockPlanes &blocks) {
     const Vec3 &t = f.tangent;
     const double inverse = 1 / f.length;

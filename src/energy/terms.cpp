@@ -38,26 +38,27 @@ std::array<double, 3> endEnergy(const Elements &elements, const Configuration &c
   const Frame f = c.frameAt(end.edge);
   const Vec3 moment = load_factor * (end.moment + end.torque * f.tangent);
   // Bending strains are curvatures multiplied by the stretch, moments their derivatives by the curvature.
-  double stretch = 1;
-  if (end.cell >= 0)
-    stretch = cellGeometry(c.frameAt(end.cell - 1), c.frameAt(end.cell), readCell<double>(elements.cells(), end.cell))
-                  .stretch;
+  const double stretch = end.stretches ? f.length * elements.inverseRestLength()[end.edge] : 1;
   const std::array<double, 3> m{moment.dot(f.director) / stretch, moment.dot(f.secondDirector()) / stretch,
                                 moment.dot(f.tangent)};
   return {0.5 * end.compliance[0] * m[0] * m[0], 0.5 * end.compliance[1] * m[1] * m[1],
           0.5 * end.compliance[2] * m[2] * m[2]};
 }
 
-EnergyBudget &EnergyBudget::operator+=(const EnergyBudget &other) {
-  kinetic += other.kinetic;
-  stretch += other.stretch;
-  bend += other.bend;
-  twist += other.twist;
-  gravity += other.gravity;
-  constraint += other.constraint;
-  contact += other.contact;
-  body_kinetic += other.body_kinetic;
-  return *this;
+EndPull endPull(const Elements &elements, const Frame &f, const EndCouple &end, double load_factor) {
+  EndPull pull;
+  if (!end.stretches) return pull;
+  const double inverse = elements.inverseRestLength()[end.edge], stretch = f.length * inverse,
+               square = stretch * stretch;
+  const Vec3 moment = load_factor * end.moment;
+  for (const int a : {0, 1}) {
+    const Vec3 director = a == 0 ? f.director : f.secondDirector();
+    const double m = moment.dot(director), bent = end.compliance[a] * m / stretch;
+    pull.force += (bent + end.rest[a]) * m / square * inverse;
+    pull.by_length -= (3 * bent + 2 * end.rest[a]) * m / (square * stretch) * inverse * inverse;
+    pull.by_spin += (2 * bent + end.rest[a]) / square * inverse * director.cross(moment);
+  }
+  return pull;
 }
 
 } // namespace tendril

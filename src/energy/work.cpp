@@ -84,10 +84,16 @@ void addWorkOfLoads(const Scene &scene, const Elements &elements, const Configur
   if (!scene.moments
            .empty()) // an end couple turns the half edge beyond the last cell, too, and what it does there is stored
     for (const auto &couples : elements.end_couples)
-      for (const EndCouple &couple : couples)
+      for (const EndCouple &couple : couples) {
+        const Frame before = start.frameAt(couple.edge), after = end.frameAt(couple.edge);
         for (int k = 0; k < 3; ++k)
           sum.add(endEnergy(elements, end, couple, factor_end)[k] -
                   endEnergy(elements, start, couple, factor_start)[k]);
+        sum.add(-0.5 *
+                (endPull(elements, before, couple, factor_start).force +
+                 endPull(elements, after, couple, factor_end).force) *
+                (after.length - before.length));
+      }
   for (const Body &body : scene.bodies) {
     const JoinedBody &b = elements.body(int(&body - scene.bodies.data()));
     if (body.force.isZero(0) && body.torque.isZero(0)) continue;

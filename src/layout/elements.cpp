@@ -65,7 +65,7 @@ public:
       const int v = last ? rod_.edges() : 0, edge = last ? rod_.edges() - 1 : 0;
       if (rod_.closed || holder_[v] || isJoined(v)) continue;
       const int cell = range_.slot(last ? edge : 1);
-      EndCouple end{last, range_.slot(edge), out_.constants_[6][cell] != 0 ? cell : -1, {}, Vec3::Zero(), 0};
+      EndCouple end{last, range_.slot(edge), rod_.energy == Energy::seed, {}, {}, Vec3::Zero(), 0};
       for (const int k : out_.momentsOf(rod)) {
         const EdgeMoment &m = scene.moments[k];
         if (m.edge != edge) continue;
@@ -77,6 +77,8 @@ public:
       const auto [k1, k2] = rod_.material.flexural_stiffness;
       const std::array<double, 3> stiffness{k1, k2, rod_.material.torsional_stiffness};
       for (int a = 0; a < 3; ++a) end.compliance[a] = stiffness[a] > 0 ? half / stiffness[a] : 0;
+      if (const double length = out_.constants_[6][cell]; length != 0)
+        for (int a = 0; a < 2; ++a) end.rest[a] = (last ? half : -half) * out_.cells()[cell_rest + a][cell] / length;
       out_.end_couples[rod].push_back(end);
     }
   }

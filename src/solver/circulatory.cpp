@@ -11,13 +11,15 @@ Circulatory::Circulatory(const IncrementalPotential &potential, std::vector<RodS
   for (const EdgeMoment &m : potential.scene().moments)
     if (isHere(m.rod)) sources_.push_back({.rod = m.rod, .couple = &m});
   for (const PlacedFollower &f : potential.elements().followers(of)) sources_.push_back({.rod = f.rod, .follower = &f});
+  for (int r = of.begin; r < of.end; ++r)
+    for (const EndCouple &end : potential.elements().end_couples[r])
+      if (end.stretches && !end.moment.isZero(0)) sources_.push_back({.rod = r, .end = &end});
   for (const JoinedBody &b : potential.elements().bodies(of))
     if (potential.isDynamic() || potential.scene().hasCouples()) sources_.push_back({.rod = b.rod, .body = &b});
   std::stable_sort(sources_.begin(), sources_.end(), [](const Source &a, const Source &b) { return a.rod < b.rod; });
   int most = 0;
   for (const RodSet island : islands_) most = std::max(most, pairsOn(island));
-  right_ = Planes(slot_size, most > 0 ? potential.dofs().slots(rods) : 0);
-  right_.setOrigin(potential.dofs().rods()[rods.begin].first_slot);
+  if (most > 0) right_ = potential.dofs().makePlanes(rods);
   solved_.assign(2 * most, right_);
 }
 
@@ -69,6 +71,15 @@ void Circulatory::addFollower(const PlacedFollower &follower) {
   addPair(p, q, -size);
 }
 
+/// The pull depends on the directors, which the spin of the edge turns.
+void Circulatory::addEndPull(int rod, const EndCouple &end) {
+  const Frame f = potential_.iterate().frameAt(end.edge);
+  const Vec3 spin = endPull(potential_.elements(), f, end, potential_.step().load_factor).by_spin;
+  columns_.push_back({rod, end.edge, f.tangent, 0, false});
+  columns_.push_back({rod, end.edge, spin.cross(f.tangent) / f.length, spin.dot(f.tangent), false});
+  strength_.push_back({1, 0});
+}
+
 PetscErrorCode Circulatory::update(const Solve &solve) {
   PetscFunctionBeginUser;
   columns_.clear();
@@ -76,6 +87,8 @@ PetscErrorCode Circulatory::update(const Solve &solve) {
   for (const Source &source : sources_)
     if (source.follower)
       addFollower(*source.follower);
+    else if (source.end)
+      addEndPull(source.rod, *source.end);
     else if (source.body)
       addCouple(source, source.body->rotation, -2 * potential_.circulation(*source.body));
     else {

@@ -1,7 +1,7 @@
 #pragma once
 /// \file term.hpp
 /// A term of the incremental potential: its value and its derivatives over the slots of one rod. To add an energy,
-/// write one file with a class derived from Term and add one line to makeTerms (terms.cpp).
+/// write one file with a class derived from Term and add one line to makeRodTerms (terms.cpp).
 
 #include "tendril/energy/cell.hpp"
 #include "tendril/geometry/box.hpp"
@@ -53,12 +53,21 @@ struct Derivatives {
 /// Stored and kinetic energies of a state, by name [J]; centrifugal potential counts as gravity.
 struct EnergyBudget {
   double kinetic = 0, stretch = 0, bend = 0, twist = 0, gravity = 0, constraint = 0, contact = 0, body_kinetic = 0;
-  double total() const { return kinetic + stretch + bend + twist + gravity + constraint + contact + body_kinetic; }
+  double total() const;
   EnergyBudget &operator+=(const EnergyBudget &other);
 };
 inline constexpr double EnergyBudget::*named_energies[] = {
     &EnergyBudget::kinetic, &EnergyBudget::stretch,    &EnergyBudget::bend,    &EnergyBudget::twist,
     &EnergyBudget::gravity, &EnergyBudget::constraint, &EnergyBudget::contact, &EnergyBudget::body_kinetic};
+inline double EnergyBudget::total() const {
+  double sum = 0;
+  for (const auto energy : named_energies) sum += this->*energy;
+  return sum;
+}
+inline EnergyBudget &EnergyBudget::operator+=(const EnergyBudget &other) {
+  for (const auto energy : named_energies) this->*energy += other.*energy;
+  return *this;
+}
 /// Those of rods that may be on several ranks.
 struct EnergySums {
   std::array<ExactSum, std::size(named_energies)> sums;
@@ -178,7 +187,8 @@ public:
 /// Moment of the half cells beside a frame by turning it [N m]. \param cells their constants, as Elements::cells()
 Vec3 momentOn(const Elements &elements, const Planes &cells, const Configuration &configuration, int rod, int frame);
 
-/// Strain around which dissipation by stiffness pulls: that at the start, with what the stage remembers.
+/// Strain around which dissipation by stiffness pulls, s of docs/theory.md (14.2): that at the start, with what the
+/// stage remembers.
 template <class T> T dampedRest(const Step &step, const T &start, std::size_t index) {
   T rest = start;
   if (step.rule)
@@ -219,5 +229,13 @@ std::unique_ptr<Term> makeBodyMotion(const Scene &, const Elements &, bool dynam
 /// balance of forces is the same with or without it.
 std::array<double, 3> endEnergy(const Elements &elements, const Configuration &configuration, const EndCouple &end,
                                 double load_factor);
+
+/// How that half pulls at its edge by the law `seed`, whose bending depends on the stretch, docs/theory.md (6.2).
+struct EndPull {
+  double force = 0;           ///< along the tangent, of a tension [N]
+  double by_length = 0;       ///< its derivatives by the length of the edge [N/m]
+  Vec3 by_spin{Vec3::Zero()}; ///< and by its spin [N]
+};
+EndPull endPull(const Elements &elements, const Frame &frame, const EndCouple &end, double load_factor);
 
 } // namespace tendril

@@ -22,8 +22,10 @@ struct LooseCell {
 /// their moment is the whole moment of the rod there.
 struct EndCouple {
   bool last;                        ///< at the last vertex of its rod, or the first
-  int edge, cell;                   ///< slots of the edge and of the cell at its other end, -1 without one
+  int edge;                         ///< slot
+  bool stretches;                   ///< whether bending is multiplied by the stretch of the edge (`seed`)
   std::array<double, 3> compliance; ///< half the edge's length over (kb1, kb2, kt), 0 for a stiffness of zero [1/(N m)]
+  std::array<double, 2> rest;       ///< turns about both directors at rest, as the cell before, by the moment [rad]
   Vec3 moment;                      ///< at load factor 1, fixed in space ... [N m]
   double torque;                    ///< ... and about the tangent [N m]
 };

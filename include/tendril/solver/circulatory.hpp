@@ -1,12 +1,11 @@
 #pragma once
 /// \file circulatory.hpp
 /// What the derivative of couples and of follower forces has beyond a symmetric matrix. A couple M fixed in space, or a
-/// torque T about the tangent, does the work (M + T t).phi in a motion whose spin is phi, and no potential has that for
-/// its differential: the derivative of its generalised forces
-/// -(M + T t).phi_i by the unknowns j, in the coordinates of the retraction, is the symmetric part that the band holds,
-/// and
+/// torque T about the tangent, does the work (M + T t).phi (docs/theory.md (33.1)) in a motion whose spin is phi, and
+/// no potential has that for its differential: the derivative of its generalised forces -(M + T t).phi_i by the
+/// unknowns j, in the coordinates of the retraction, is the symmetric part that the band holds, and
 ///
-///     A_ij = (M - T t).(phi_i x phi_j)/2
+///     A_ij = (M - T t).(phi_i x phi_j)/2    (33.2)
 ///
 /// (the Maurer-Cartan equation of the rotations, in space for M, in the frame for T; structural mechanics calls such
 /// forces circulatory, Ziegler 1968, Principles of Structural Stability). That is of rank two for each couple, so that
@@ -14,7 +13,7 @@
 /// Morrison and Woodbury, whatever the linear solver. A force F on a vertex v that turns with an edge whose spin is phi
 /// has the derivative
 ///
-///     -phi x F = |F| (q (p.phi) - p (q.phi)),  p, q and F/|F| orthonormal and right-handed
+///     -phi x F = |F| (q (p.phi) - p (q.phi)),  p, q and F/|F| orthonormal and right-handed    (33.3)
 ///
 /// in the rows of the vertex, of rank two as well: all of it stands here, none in the band.
 
@@ -52,12 +51,14 @@ private:
   };
   const IncrementalPotential &potential_;
   std::vector<RodSet> islands_;
-  /// One of a couple on an edge, what the spin of a body has beyond a symmetric matrix, and a follower force.
+  /// One of a couple on an edge, what the spin of a body has beyond a symmetric matrix, a follower force, and how the
+  /// half edge beyond an end couple pulls.
   struct Source {
     int rod;
     const EdgeMoment *couple = nullptr;
     const JoinedBody *body = nullptr;
     const PlacedFollower *follower = nullptr;
+    const EndCouple *end = nullptr;
     int pairs() const { return follower ? 2 : 1; } ///< of columns
   };
   /// The matrix has forward a b' + backward b a' of two columns a and b that follow each other.
@@ -68,6 +69,7 @@ private:
   int pairsOn(RodSet island) const;
   void addCouple(const Source &source, int slot, const Vec3 &moment);
   void addFollower(const PlacedFollower &follower);
+  void addEndPull(int rod, const EndCouple &end);
   std::vector<Column> columns_;    ///< two for each pair
   std::vector<Strength> strength_; ///< of each pair
   Planes right_;                   ///< over the rods, as those solved
