@@ -1,4 +1,4 @@
-/// Indefinite Hessians: descent directions from shifted ones, and the ways out of saddles.
+/// Whether an answer is a minimum, and the ways out of saddles.
 #include "tendril/contact/contact.hpp"
 #include "tendril/solver/activity.hpp"
 #include "tendril/solver/hints.hpp"
